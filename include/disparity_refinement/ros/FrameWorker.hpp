@@ -1,0 +1,89 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "disparity_refinement/ros/StageMonitor.hpp"
+
+namespace disparity_refinement {
+
+/// Processes frames one after the other on a thread of its own.
+///
+/// The nodelet's callbacks only push, so messages are received while a frame is computed and nothing waits
+/// unseen in a queue of roscpp. When the queue is full the oldest frame is dropped and counted: latency stays
+/// bounded. An exception that leaves `process` is reported and the next frame is processed; it would
+/// otherwise end the manager and every nodelet in it.
+template <class Frame>
+class FrameWorker {
+ public:
+  using Process = std::function<void(const Frame&)>;
+
+  FrameWorker(std::size_t queue_size, StageMonitor& monitor, Process process)
+      : queue_size_(queue_size),
+        monitor_(monitor),
+        process_(std::move(process)),
+        thread_([this] { run(); }) {}
+
+  /// Ends after the frame at work.
+  ~FrameWorker() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stop_ = true;
+    }
+    wake_.notify_one();
+    thread_.join();
+  }
+
+  FrameWorker(const FrameWorker&) = delete;
+  FrameWorker& operator=(const FrameWorker&) = delete;
+
+  void push(Frame frame) {
+    monitor_.received();
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (queue_.size() >= queue_size_) {
+        queue_.pop_front();
+        monitor_.dropped();
+      }
+      queue_.push_back(std::move(frame));
+    }
+    wake_.notify_one();
+  }
+
+ private:
+  void run() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (true) {
+      wake_.wait(lock, [this] { return stop_ || !queue_.empty(); });
+      if (stop_) return;
+      const Frame frame = std::move(queue_.front());
+      queue_.pop_front();
+      lock.unlock();
+      try {
+        process_(frame);
+      } catch (const std::exception& e) {
+        monitor_.error(e.what());
+      } catch (...) {
+        monitor_.error("unknown exception");
+      }
+      lock.lock();
+    }
+  }
+
+  const std::size_t queue_size_;
+  StageMonitor& monitor_;
+  const Process process_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<Frame> queue_;
+  bool stop_ = false;
+  std::thread thread_;  // last: it uses the others
+};
+
+}  // namespace disparity_refinement

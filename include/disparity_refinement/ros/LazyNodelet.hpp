@@ -1,0 +1,51 @@
+#pragma once
+
+#include <image_transport/image_transport.h>
+#include <nodelet/nodelet.h>
+#include <ros/ros.h>
+
+#include <mutex>
+#include <string>
+
+namespace disparity_refinement {
+
+/// Nodelet that subscribes to its inputs only while somebody listens to its outputs.
+///
+/// onInit() builds everything, advertises through this class and calls start() last: connections may be
+/// reported by another thread while onInit() is still at work. The parameter ~lazy (default true) switches
+/// the behaviour off.
+class LazyNodelet : public nodelet::Nodelet {
+ protected:
+  template <class Message>
+  ros::Publisher advertise(ros::NodeHandle& nh, const std::string& topic) {
+    const ros::SubscriberStatusCallback changed = [this](const ros::SingleSubscriberPublisher&) { update(); };
+    return nh.advertise<Message>(topic, kPublisherQueueSize, changed, changed);
+  }
+
+  image_transport::Publisher advertiseImage(image_transport::ImageTransport& transport,
+                                            const std::string& topic);
+
+  /// Ends onInit(): from here on updateSubscriptions() is called.
+  void start();
+
+  /// Begins the destructor of a derived class: updateSubscriptions() is not called any more.
+  void stop();
+
+  /// Subscribe to what isWanted() and shut down the rest. Called whenever a listener comes or goes.
+  virtual void updateSubscriptions() = 0;
+
+  template <class Publisher>
+  bool isWanted(const Publisher& publisher) const {
+    return !lazy_ || publisher.getNumSubscribers() > 0;
+  }
+
+ private:
+  static constexpr int kPublisherQueueSize = 10;
+  void update();
+
+  std::mutex mutex_;
+  bool started_ = false;
+  bool lazy_ = true;
+};
+
+}  // namespace disparity_refinement

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <dynamic_reconfigure/server.h>
+#include <ros/ros.h>
+
+#include <boost/thread/recursive_mutex.hpp>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "disparity_refinement/DisparityConfig.h"
+#include "disparity_refinement/PlaneRefinementConfig.h"
+#include "disparity_refinement/SegmentationConfig.h"
+#include "disparity_refinement/VisualizationConfig.h"
+#include "disparity_refinement/matching/StereoMatcher.hpp"
+#include "disparity_refinement/refinement/PlaneRefinement.hpp"
+#include "disparity_refinement/segmentation/Segmentation.hpp"
+
+namespace disparity_refinement {
+
+/// Parameters of the core from a configuration. A value that no single bound of the .cfg can exclude (an even
+/// window) is replaced in the configuration too, so that the user sees what is in force.
+MatchingParameters toParameters(DisparityConfig& config);
+SegmentationParameters toParameters(SegmentationConfig& config);
+PlaneRefinementParameters toParameters(PlaneRefinementConfig& config);
+VisualizationConfig toParameters(VisualizationConfig& config);
+
+/// Warns about every start value on the parameter server that is not the one in force: out of range, or of
+/// another type.
+void warnAboutRefusedValues(const ros::NodeHandle& private_nh, const dynamic_reconfigure::Config& in_force);
+
+/// The parameters of one nodelet, live through dynamic_reconfigure on its private handle. A frame takes one
+/// snapshot.
+template <class Config>
+class LiveParameters {
+ public:
+  using Parameters = decltype(toParameters(std::declval<Config&>()));
+
+  explicit LiveParameters(const ros::NodeHandle& private_nh) {
+    Config start = Config::__getDefault__();
+    start.__fromServer__(private_nh);
+    start.__clamp__();
+    toParameters(start);
+    dynamic_reconfigure::Config in_force;
+    start.__toMessage__(in_force);
+    warnAboutRefusedValues(private_nh, in_force);
+
+    server_.reset(new dynamic_reconfigure::Server<Config>(server_mutex_, private_nh));
+    // Calls back at once.
+    server_->setCallback([this](Config& config, std::uint32_t) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      parameters_ = toParameters(config);
+    });
+  }
+
+  Parameters snapshot() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return parameters_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  Parameters parameters_;
+  boost::recursive_mutex server_mutex_;
+  std::unique_ptr<dynamic_reconfigure::Server<Config>> server_;
+};
+
+}  // namespace disparity_refinement

@@ -1,0 +1,110 @@
+#include <ros/ros.h>
+#include <stereo_msgs/DisparityImage.h>
+
+#include <algorithm>
+#include <memory>
+#include <pluginlib/class_list_macros.hpp>
+#include <stdexcept>
+
+#include "disparity_refinement/matching/StereoMatcher.hpp"
+#include "disparity_refinement/ros/FrameWorker.hpp"
+#include "disparity_refinement/ros/LazyNodelet.hpp"
+#include "disparity_refinement/ros/LiveParameters.hpp"
+#include "disparity_refinement/ros/Messages.hpp"
+#include "disparity_refinement/ros/StageMonitor.hpp"
+#include "disparity_refinement/ros/StereoSubscriber.hpp"
+
+namespace disparity_refinement {
+
+/// left/image_rect, left/camera_info, right/image_rect, right/camera_info -> disparity.
+class DisparityNodelet : public LazyNodelet {
+ public:
+  ~DisparityNodelet() override {
+    // First whoever calls this object from another thread.
+    stop();
+    subscriber_.reset();
+    worker_.reset();
+    monitor_.reset();
+  }
+
+ private:
+  void onInit() override {
+    ros::NodeHandle& nh = getNodeHandle();
+    ros::NodeHandle& private_nh = getPrivateNodeHandle();
+    monitor_ = std::make_unique<StageMonitor>(getName(), nh, private_nh);
+    parameters_ = std::make_unique<LiveParameters<DisparityConfig>>(private_nh);
+    const auto queue_size = static_cast<std::size_t>(std::max(1, private_nh.param("queue_size", 5)));
+    worker_ = std::make_unique<FrameWorker<StereoFrame>>(
+        queue_size, *monitor_, [this](const StereoFrame& frame) { process(frame); });
+    subscriber_ = std::make_unique<StereoSubscriber>(
+        nh, private_nh, *monitor_, [this](const StereoFrame& frame) { worker_->push(frame); });
+    publisher_ = advertise<stereo_msgs::DisparityImage>(nh, "disparity");
+    start();
+  }
+
+  void updateSubscriptions() override {
+    if (!isWanted(publisher_)) {
+      subscriber_->unsubscribe();
+    } else {
+      subscriber_->subscribe();
+    }
+  }
+
+  void process(const StereoFrame& frame) {
+    const ros::WallTime begin = ros::WallTime::now();
+    monitor_->traceReceived("left/image_rect", frame.left->header.stamp, frame.left->data.data());
+    monitor_->traceReceived("right/image_rect", frame.right->header.stamp, frame.right->data.data());
+    matcher_.setParameters(parameters_->snapshot());
+    warnAboutFrameIds(frame);
+
+    const StereoGeometry geometry = geometryOf(frame);
+    const auto left = grayImage(frame.left, subscriber_->leftImageTopic());
+    const auto right = grayImage(frame.right, subscriber_->rightImageTopic());
+    const DisparityRange range = matcher_.range(geometry.principal_point_offset);
+    const cv::Size size = left->image.size();
+
+    const auto message =
+        makeDisparityImage(frame.left->header, size, geometry, range, matcher_.validWindow(size));
+    cv::Mat disparity = imageView(message->image, sensor_msgs::image_encodings::TYPE_32FC1, "disparity");
+    try {
+      matcher_.compute(left->image, right->image, disparity, geometry.principal_point_offset);
+    } catch (const std::invalid_argument& e) {
+      throw std::invalid_argument(subscriber_->leftImageTopic() + ", " + subscriber_->rightImageTopic() +
+                                  ": " + e.what());
+    }
+    monitor_->published(message->header.stamp, (ros::WallTime::now() - begin).toSec() * 1e3);
+    monitor_->tracePublished("disparity", message->header.stamp, message->image.data.data());
+    publisher_.publish(message);
+  }
+
+  StereoGeometry geometryOf(const StereoFrame& frame) const {
+    try {
+      return stereoGeometry(*frame.left_info, *frame.right_info);
+    } catch (const std::invalid_argument& e) {
+      throw std::invalid_argument(subscriber_->leftInfoTopic() + ", " + subscriber_->rightInfoTopic() + ": " +
+                                  e.what());
+    }
+  }
+
+  void warnAboutFrameIds(const StereoFrame& frame) {
+    const std::string& left = frame.left_info->header.frame_id;
+    const std::string& right = frame.right_info->header.frame_id;
+    if (left == right || warned_about_frame_ids_) return;
+    warned_about_frame_ids_ = true;
+    monitor_->warning(subscriber_->leftInfoTopic() + " is in frame '" + left + "', " +
+                      subscriber_->rightInfoTopic() + " in '" + right +
+                      "', expected the left camera's frame in both: the left image's is used");
+  }
+
+  std::unique_ptr<StageMonitor> monitor_;
+  std::unique_ptr<LiveParameters<DisparityConfig>> parameters_;
+  StereoMatcher matcher_;
+  bool warned_about_frame_ids_ = false;
+  ros::Publisher publisher_;
+  std::unique_ptr<StereoSubscriber> subscriber_;
+  std::unique_ptr<FrameWorker<StereoFrame>> worker_;
+};
+
+}  // namespace disparity_refinement
+
+PLUGINLIB_EXPORT_CLASS(disparity_refinement::DisparityNodelet, nodelet::Nodelet)

@@ -1,0 +1,92 @@
+#include <image_transport/image_transport.h>
+#include <ros/ros.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/image_encodings.h>
+
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <pluginlib/class_list_macros.hpp>
+
+#include "disparity_refinement/ros/FrameWorker.hpp"
+#include "disparity_refinement/ros/LazyNodelet.hpp"
+#include "disparity_refinement/ros/LiveParameters.hpp"
+#include "disparity_refinement/ros/Messages.hpp"
+#include "disparity_refinement/ros/StageMonitor.hpp"
+#include "disparity_refinement/segmentation/Segmentation.hpp"
+
+namespace disparity_refinement {
+
+/// left/image_rect -> labels.
+class SegmentationNodelet : public LazyNodelet {
+ public:
+  ~SegmentationNodelet() override {
+    // First whoever calls this object from another thread.
+    stop();
+    subscriber_.shutdown();
+    worker_.reset();
+    monitor_.reset();
+  }
+
+ private:
+  void onInit() override {
+    ros::NodeHandle& nh = getNodeHandle();
+    ros::NodeHandle& private_nh = getPrivateNodeHandle();
+    monitor_ = std::make_unique<StageMonitor>(getName(), nh, private_nh);
+    monitor_->addDiagnostics([this](diagnostic_updater::DiagnosticStatusWrapper& status) {
+      const SegmentationParameters parameters = parameters_->snapshot();
+      status.add("segments", segments_.load());
+      status.add("lambda [px]", parameters.lambda);
+      status.add("h [gray levels]", parameters.h);
+    });
+    parameters_ = std::make_unique<LiveParameters<SegmentationConfig>>(private_nh);
+    queue_size_ = std::max(1, private_nh.param("queue_size", 5));
+    transport_ = std::make_unique<image_transport::ImageTransport>(nh);
+    worker_ = std::make_unique<FrameWorker<sensor_msgs::ImageConstPtr>>(
+        queue_size_, *monitor_, [this](const sensor_msgs::ImageConstPtr& image) { process(image); });
+    publisher_ = advertise<sensor_msgs::Image>(nh, "labels");
+    start();
+  }
+
+  void updateSubscriptions() override {
+    if (!isWanted(publisher_)) {
+      subscriber_.shutdown();
+    } else if (!subscriber_) {
+      subscriber_ = transport_->subscribe(
+          "left/image_rect", queue_size_,
+          [this](const sensor_msgs::ImageConstPtr& image) { worker_->push(image); }, ros::VoidPtr(),
+          image_transport::TransportHints("raw", ros::TransportHints().tcpNoDelay(), getPrivateNodeHandle()));
+    }
+  }
+
+  void process(const sensor_msgs::ImageConstPtr& image) {
+    const ros::WallTime begin = ros::WallTime::now();
+    const SegmentationParameters parameters = parameters_->snapshot();
+    monitor_->traceReceived("left/image_rect", image->header.stamp, image->data.data());
+    const auto gray = grayImage(image, getNodeHandle().resolveName("left/image_rect"));
+
+    const auto message =
+        makeImage(image->header, gray->image.size(), sensor_msgs::image_encodings::TYPE_32SC1);
+    cv::Mat labels = imageView(*message, sensor_msgs::image_encodings::TYPE_32SC1, "labels");
+    segments_ = segmentation_.compute(gray->image, parameters, labels);
+    ROS_DEBUG_STREAM("[" << getName() << "] " << segments_ << " segments (lambda " << parameters.lambda
+                         << " px, h " << parameters.h << ")");
+    monitor_->published(message->header.stamp, (ros::WallTime::now() - begin).toSec() * 1e3);
+    monitor_->tracePublished("labels", message->header.stamp, message->data.data());
+    publisher_.publish(message);
+  }
+
+  std::unique_ptr<StageMonitor> monitor_;
+  std::unique_ptr<LiveParameters<SegmentationConfig>> parameters_;
+  Segmentation segmentation_;
+  std::atomic<int> segments_{0};
+  int queue_size_ = 5;
+  ros::Publisher publisher_;
+  std::unique_ptr<image_transport::ImageTransport> transport_;
+  image_transport::Subscriber subscriber_;
+  std::unique_ptr<FrameWorker<sensor_msgs::ImageConstPtr>> worker_;
+};
+
+}  // namespace disparity_refinement
+
+PLUGINLIB_EXPORT_CLASS(disparity_refinement::SegmentationNodelet, nodelet::Nodelet)

@@ -1,0 +1,31 @@
+#include "disparity_refinement/ros/LazyNodelet.hpp"
+
+namespace disparity_refinement {
+
+image_transport::Publisher LazyNodelet::advertiseImage(image_transport::ImageTransport& transport,
+                                                       const std::string& topic) {
+  const image_transport::SubscriberStatusCallback changed =
+      [this](const image_transport::SingleSubscriberPublisher&) { update(); };
+  return transport.advertise(topic, kPublisherQueueSize, changed, changed);
+}
+
+void LazyNodelet::start() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    lazy_ = getPrivateNodeHandle().param("lazy", true);
+    started_ = true;
+  }
+  update();
+}
+
+void LazyNodelet::stop() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  started_ = false;
+}
+
+void LazyNodelet::update() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (started_) updateSubscriptions();
+}
+
+}  // namespace disparity_refinement

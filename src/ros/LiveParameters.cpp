@@ -1,0 +1,114 @@
+#include "disparity_refinement/ros/LiveParameters.hpp"
+
+#include <XmlRpcValue.h>
+
+#include <algorithm>
+#include <limits>
+
+namespace disparity_refinement {
+namespace {
+
+int nextOdd(int value) { return value | 1; }
+
+/// The value as a number, or NaN if it is none.
+double toNumber(XmlRpc::XmlRpcValue value) {
+  switch (value.getType()) {
+    case XmlRpc::XmlRpcValue::TypeBoolean:
+      return static_cast<bool>(value) ? 1.0 : 0.0;
+    case XmlRpc::XmlRpcValue::TypeInt:
+      return static_cast<int>(value);
+    case XmlRpc::XmlRpcValue::TypeDouble:
+      return static_cast<double>(value);
+    default:
+      return std::numeric_limits<double>::quiet_NaN();
+  }
+}
+
+template <class Values>
+void warnAboutRefused(const ros::NodeHandle& private_nh, const Values& in_force) {
+  for (const auto& parameter : in_force) {
+    XmlRpc::XmlRpcValue asked;
+    if (!private_nh.getParam(parameter.name, asked)) continue;
+    const double value = static_cast<double>(parameter.value);
+    if (toNumber(asked) == value) continue;
+    ROS_WARN_STREAM(private_nh.resolveName(parameter.name)
+                    << " is " << asked << ", which is out of range or of the wrong type: using " << value);
+  }
+}
+
+}  // namespace
+
+MatchingParameters toParameters(DisparityConfig& config) {
+  config.prefilter_size = nextOdd(config.prefilter_size);
+  config.correlation_window_size = nextOdd(config.correlation_window_size);
+  if (config.stereo_algorithm == static_cast<int>(StereoAlgorithm::BM)) {
+    config.correlation_window_size = std::max(5, config.correlation_window_size);
+  }
+  config.disparity_range = config.disparity_range / 16 * 16;
+  if (config.fullDP) config.sgbm_mode = static_cast<int>(SgbmMode::HH);
+
+  MatchingParameters parameters;
+  parameters.stereo_algorithm = static_cast<StereoAlgorithm>(config.stereo_algorithm);
+  parameters.sgbm_mode = static_cast<SgbmMode>(config.sgbm_mode);
+  parameters.prefilter_size = config.prefilter_size;
+  parameters.prefilter_cap = config.prefilter_cap;
+  parameters.correlation_window_size = config.correlation_window_size;
+  parameters.min_disparity = config.min_disparity;
+  parameters.disparity_range = config.disparity_range;
+  parameters.uniqueness_ratio = config.uniqueness_ratio;
+  parameters.texture_threshold = config.texture_threshold;
+  parameters.speckle_size = config.speckle_size;
+  parameters.speckle_range = config.speckle_range;
+  parameters.P1 = config.P1;
+  parameters.P2 = config.P2;
+  parameters.disp12MaxDiff = config.disp12MaxDiff;
+  parameters.full_width = config.full_width;
+  return parameters;
+}
+
+SegmentationParameters toParameters(SegmentationConfig& config) {
+  if (config.connectivity != static_cast<int>(Connectivity::EIGHT)) {
+    config.connectivity = static_cast<int>(Connectivity::FOUR);
+  }
+  SegmentationParameters parameters;
+  parameters.lambda = config.lambda;
+  parameters.h = config.h;
+  parameters.connectivity = static_cast<Connectivity>(config.connectivity);
+  parameters.gradient.structuring_element = static_cast<StructuringElement>(config.structuring_element);
+  parameters.gradient.shadow_enhancement = config.shadow_enhancement;
+  parameters.gradient.shadow_threshold = config.shadow_threshold;
+  parameters.gradient.shadow_gamma = config.shadow_gamma;
+  return parameters;
+}
+
+PlaneRefinementParameters toParameters(PlaneRefinementConfig& config) {
+  PlaneRefinementParameters parameters;
+  parameters.inlier_threshold = config.inlier_threshold;
+  parameters.confidence = config.confidence;
+  parameters.max_slope_x = config.max_slope_x;
+  parameters.max_slope_y = config.max_slope_y;
+  parameters.disparity_error = config.disparity_error;
+  parameters.max_depth_error = config.max_depth_error;
+  parameters.min_valid_fraction = config.min_valid_fraction;
+  parameters.min_valid_points = config.min_valid_points;
+  parameters.max_iterations = config.max_iterations;
+  parameters.max_divergence = config.max_divergence;
+  parameters.divergence_action = static_cast<DivergenceAction>(config.divergence_action);
+  parameters.out_of_range_action = static_cast<OutOfRangeAction>(config.out_of_range_action);
+  return parameters;
+}
+
+VisualizationConfig toParameters(VisualizationConfig& config) {
+  if (config.color_max_disparity <= config.color_min_disparity) {
+    config.color_max_disparity = config.color_min_disparity + 1.0;
+  }
+  return config;
+}
+
+void warnAboutRefusedValues(const ros::NodeHandle& private_nh, const dynamic_reconfigure::Config& in_force) {
+  warnAboutRefused(private_nh, in_force.bools);
+  warnAboutRefused(private_nh, in_force.ints);
+  warnAboutRefused(private_nh, in_force.doubles);
+}
+
+}  // namespace disparity_refinement
