@@ -1,0 +1,27 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+
+#include "disparity_refinement/segmentation/arguments.hpp"
+
+namespace disparity_refinement {
+
+/// "CV_32FC1 of 1242x375"
+inline std::string describeImage(int type, const cv::Size& size) {
+  return cv::typeToString(type) + " of " + std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
+/// Throws std::invalid_argument unless the image has this type and size and is not empty.
+inline void requireImage(const cv::Mat& image, const std::string& name, int type, const cv::Size& size) {
+  const cv::Size actual(image.cols, image.rows);
+  requireArgument(image.dims == 2 && !image.empty() && image.type() == type && actual == size, name,
+                  describeImage(image.type(), actual), describeImage(type, size) + ", not empty");
+}
+
+/// The same for an image of any size.
+inline void requireImage(const cv::Mat& image, const std::string& name, int type) {
+  requireImage(image, name, type, cv::Size(image.cols, image.rows));
+}
+
+}  // namespace disparity_refinement
