@@ -1,0 +1,318 @@
+// The nodelets as stereo_refinement.launch starts them, seen from another process.
+
+#include <diagnostic_msgs/DiagnosticArray.h>
+#include <dynamic_reconfigure/Reconfigure.h>
+#include <gtest/gtest.h>
+#include <stereo_msgs/DisparityImage.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "ChainClient.hpp"
+#include "disparity_refinement/Planes.h"
+#include "disparity_refinement/matching/StereoMatcher.hpp"
+#include "disparity_refinement/refinement/PlaneRefinement.hpp"
+#include "disparity_refinement/segmentation/Segmentation.hpp"
+
+namespace disparity_refinement {
+namespace {
+
+using sensor_msgs::Image;
+using stereo_msgs::DisparityImage;
+
+/// The same pair through the core, with the parameters of chain.test.
+struct CoreResult {
+  DisparityRange range;
+  cv::Mat disparity, labels, refined;
+  int segments = 0;
+  std::vector<SegmentPlane> planes;
+};
+
+CoreResult runCore(const StereoMessages& messages, const SegmentationParameters& segmentation_parameters) {
+  const cv::Mat left = imageView(*messages.left, "mono8", "left");
+  const cv::Mat right = imageView(*messages.right, "mono8", "right");
+  MatchingParameters matching_parameters;
+  matching_parameters.disparity_range = 64;
+  PlaneRefinementParameters refinement_parameters;
+  refinement_parameters.min_valid_fraction = 0.2;
+
+  CoreResult result;
+  StereoMatcher matcher(matching_parameters);
+  matcher.compute(left, right, result.disparity);
+  result.range = matcher.range();
+  Segmentation segmentation;
+  result.segments = segmentation.compute(left, segmentation_parameters, result.labels);
+  PlaneRefinement refinement;
+  const double f_times_t = static_cast<double>(static_cast<float>(messages.left_info->P[0])) *
+                           static_cast<float>(-messages.right_info->P[3] / messages.left_info->P[0]);
+  refinement.refine(result.disparity, result.labels, result.range, f_times_t, refinement_parameters,
+                    result.refined);
+  result.planes = refinement.planes();
+  return result;
+}
+
+SegmentationParameters testSegmentation() {
+  SegmentationParameters parameters;
+  parameters.lambda = 20;
+  parameters.h = 3;
+  return parameters;
+}
+
+bool sameBits(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && a.type() == b.type() && a.isContinuous() && b.isContinuous() &&
+         std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
+}
+
+class Chain : public testing::Test {
+ protected:
+  void setParameters(int lambda, int h) {
+    dynamic_reconfigure::Reconfigure call;
+    dynamic_reconfigure::IntParameter parameter;
+    parameter.name = "lambda";
+    parameter.value = lambda;
+    call.request.config.ints.push_back(parameter);
+    parameter.name = "h";
+    parameter.value = h;
+    call.request.config.ints.push_back(parameter);
+    ASSERT_TRUE(ros::service::waitForService("segmentation/set_parameters", ros::Duration(kTimeout)));
+    ASSERT_TRUE(ros::service::call("segmentation/set_parameters", call));
+  }
+
+  ros::NodeHandle nh_;
+  StereoCamera camera_{nh_};
+};
+
+TEST_F(Chain, givesTheBitsOfTheCore) {
+  Listener<DisparityImage> raw(nh_, "disparity"), refined(nh_, "disparity_refined");
+  Listener<Image> labels(nh_, "labels");
+  ASSERT_TRUE(camera_.waitForChain(refined));
+  for (int i = 0; i < 5; ++i) {
+    const StereoMessages messages = camera_.make(i);
+    camera_.publish(messages);
+    const auto raw_message = raw.wait(camera_.stamp(i));
+    const auto labels_message = labels.wait(camera_.stamp(i));
+    const auto refined_message = refined.wait(camera_.stamp(i));
+    ASSERT_TRUE(raw_message && labels_message && refined_message) << "frame " << i;
+    const CoreResult core = runCore(messages, testSegmentation());
+    EXPECT_TRUE(sameBits(imageView(raw_message->image, "32FC1", "disparity"), core.disparity))
+        << "frame " << i;
+    EXPECT_TRUE(sameBits(imageView(*labels_message, "32SC1", "labels"), core.labels)) << "frame " << i;
+    EXPECT_TRUE(sameBits(imageView(refined_message->image, "32FC1", "refined"), core.refined))
+        << "frame " << i;
+    EXPECT_GT(cv::countNonZero(core.refined >= core.range.min),
+              cv::countNonZero(core.disparity >= core.range.min))
+        << "the refinement fills nothing: the test says little";
+  }
+}
+
+/// Every field that a consumer relies on.
+void expectContract(const DisparityImage& message, const StereoMessages& messages, double f,
+                    double baseline) {
+  EXPECT_EQ(message.header.stamp, messages.left->header.stamp);
+  EXPECT_EQ(message.header.frame_id, "stereo_left");
+  EXPECT_EQ(message.image.header.stamp, message.header.stamp);
+  EXPECT_EQ(message.image.header.frame_id, message.header.frame_id);
+  EXPECT_EQ(message.image.encoding, "32FC1");
+  EXPECT_EQ(message.image.width, messages.left->width);
+  EXPECT_EQ(message.image.height, messages.left->height);
+  EXPECT_EQ(message.image.step, 4 * messages.left->width);
+  EXPECT_EQ(message.image.data.size(), std::size_t{message.image.step} * message.image.height);
+  EXPECT_FLOAT_EQ(message.f, static_cast<float>(f));
+  EXPECT_FLOAT_EQ(message.T, static_cast<float>(baseline));
+  EXPECT_EQ(message.min_disparity, 0.0F);
+  EXPECT_EQ(message.max_disparity, 64.0F);
+  EXPECT_EQ(message.delta_d, 1.0F / 16.0F);
+  EXPECT_LE(message.valid_window.x_offset + message.valid_window.width, message.image.width);
+  EXPECT_LE(message.valid_window.y_offset + message.valid_window.height, message.image.height);
+  EXPECT_GT(message.valid_window.width, 0U);
+  EXPECT_GT(message.valid_window.height, 0U);
+
+  const cv::Mat map = imageView(message.image, "32FC1", "map");
+  int invalid = 0;
+  for (int y = 0; y < map.rows; ++y) {
+    for (int x = 0; x < map.cols; ++x) {
+      const float d = map.at<float>(y, x);
+      if (d == message.min_disparity - 1.0F) {
+        ++invalid;
+      } else {
+        ASSERT_TRUE(d >= message.min_disparity && d <= message.max_disparity)
+            << d << " at " << x << ", " << y;
+      }
+    }
+  }
+  EXPECT_GT(invalid, 0);
+}
+
+TEST_F(Chain, fillsEveryFieldOfBothDisparityImages) {
+  Listener<DisparityImage> raw(nh_, "disparity"), refined(nh_, "disparity_refined");
+  ASSERT_TRUE(camera_.waitForChain(refined));
+  const StereoMessages messages = camera_.make(0);
+  camera_.publish(messages);
+  const auto raw_message = raw.wait(camera_.stamp(0));
+  const auto refined_message = refined.wait(camera_.stamp(0));
+  ASSERT_TRUE(raw_message && refined_message);
+  const StreetParameters& street = camera_.street().parameters();
+  expectContract(*raw_message, messages, street.focal_length, street.baseline);
+  expectContract(*refined_message, messages, street.focal_length, street.baseline);
+}
+
+TEST_F(Chain, readsTheBaselineFromBothProjectionMatrices) {
+  Listener<DisparityImage> raw(nh_, "disparity");
+  ASSERT_TRUE(camera_.waitForChain(raw));
+  // As in KITTI's colour pair: both matrices are relative to a third camera, K is not filled in.
+  StereoMessages messages = camera_.make(0);
+  const double f = messages.left_info->P[0];
+  messages.left_info->P[3] = 0.06 * f;
+  messages.right_info->P[3] = -0.47 * f;
+  messages.left_info->K.fill(0.0);
+  messages.right_info->K.fill(0.0);
+  camera_.publish(messages);
+  const auto message = raw.wait(camera_.stamp(0));
+  ASSERT_TRUE(message);
+  EXPECT_FLOAT_EQ(message->T, 0.53F);
+}
+
+TEST_F(Chain, subtractsThePrincipalPointOffsetOfAVergedRigOnce) {
+  Listener<DisparityImage> raw(nh_, "disparity"), refined(nh_, "disparity_refined");
+  ASSERT_TRUE(camera_.waitForChain(refined));
+  camera_.publish(0);
+  const auto parallel = raw.wait(camera_.stamp(0));
+  ASSERT_TRUE(parallel);
+  StereoMessages messages = camera_.make(0);
+  messages.left->header.stamp = messages.right->header.stamp = messages.left_info->header.stamp =
+      messages.right_info->header.stamp = camera_.stamp(1);
+  messages.right_info->P[2] -= 5.25;
+  camera_.publish(messages);
+  const auto verged = raw.wait(camera_.stamp(1));
+  const auto verged_refined = refined.wait(camera_.stamp(1));
+  ASSERT_TRUE(verged && verged_refined);
+  EXPECT_EQ(verged->min_disparity, -5.25F);
+  EXPECT_EQ(verged->max_disparity, 58.75F);
+  EXPECT_EQ(verged_refined->min_disparity, -5.25F);
+  const cv::Mat before = imageView(parallel->image, "32FC1", "parallel");
+  const cv::Mat after = imageView(verged->image, "32FC1", "verged");
+  EXPECT_EQ(cv::norm(before - 5.25F, after, cv::NORM_INF), 0.0) << "the invalid value is shifted too";
+}
+
+TEST_F(Chain, lambdaAndHAreLiveFromTheNextFrameOn) {
+  Listener<Image> labels(nh_, "labels");
+  Listener<diagnostic_msgs::DiagnosticArray> diagnostics(nh_, "/diagnostics");
+  ASSERT_TRUE(camera_.waitForChain(labels));
+  int index = 0;
+  for (const auto& [lambda, h] : {std::pair<int, int>(80, 15), {5, 2}, {20, 3}}) {
+    setParameters(lambda, h);
+    const StereoMessages messages = camera_.make(index);
+    camera_.publish(messages);
+    const auto message = labels.wait(camera_.stamp(index++));
+    ASSERT_TRUE(message);
+    SegmentationParameters parameters;
+    parameters.lambda = lambda;
+    parameters.h = h;
+    const CoreResult core = runCore(messages, parameters);
+    EXPECT_TRUE(sameBits(imageView(*message, "32SC1", "labels"), core.labels)) << lambda << ", " << h;
+
+    const std::string count = std::to_string(core.segments);
+    EXPECT_TRUE(diagnostics.wait([&count](const diagnostic_msgs::DiagnosticArray& array) {
+      for (const auto& status : array.status) {
+        if (status.name.find("segmentation") == std::string::npos) continue;
+        for (const auto& value : status.values) {
+          if (value.key == "segments" && value.value == count) return true;
+        }
+      }
+      return false;
+    })) << "no diagnostics with "
+        << count << " segments";
+  }
+}
+
+TEST_F(Chain, publishesThePlanesOfTheCore) {
+  Listener<Planes> planes(nh_, "planes");
+  ASSERT_TRUE(camera_.waitForChain(planes));
+  const StereoMessages messages = camera_.make(0);
+  camera_.publish(messages);
+  const auto message = planes.wait(camera_.stamp(0));
+  ASSERT_TRUE(message);
+  const CoreResult core = runCore(messages, testSegmentation());
+  EXPECT_EQ(message->header.frame_id, "stereo_left");
+  ASSERT_EQ(message->planes.size(), static_cast<std::size_t>(core.segments));
+  int accepted = 0;
+  for (std::size_t i = 0; i < core.planes.size(); ++i) {
+    EXPECT_EQ(message->planes[i].a, core.planes[i].a);
+    EXPECT_EQ(message->planes[i].b, core.planes[i].b);
+    EXPECT_EQ(message->planes[i].c, core.planes[i].c);
+    EXPECT_EQ(message->planes[i].pixels, static_cast<std::uint32_t>(core.planes[i].pixels));
+    EXPECT_EQ(message->planes[i].valid, static_cast<std::uint32_t>(core.planes[i].valid));
+    EXPECT_EQ(message->planes[i].inliers, static_cast<std::uint32_t>(core.planes[i].inliers));
+    EXPECT_EQ(message->planes[i].status, static_cast<std::uint8_t>(core.planes[i].status));
+    accepted += message->planes[i].status == Plane::ACCEPTED ? 1 : 0;
+  }
+  EXPECT_GT(accepted, 0);
+}
+
+TEST_F(Chain, publishesDepthInMetres) {
+  Listener<Image> depth(nh_, "depth");
+  ASSERT_TRUE(camera_.waitForChain(depth));
+  const StereoMessages messages = camera_.make(0);
+  camera_.publish(messages);
+  const auto message = depth.wait(camera_.stamp(0));
+  ASSERT_TRUE(message);
+  const CoreResult core = runCore(messages, testSegmentation());
+  const cv::Mat z = imageView(*message, "32FC1", "depth");
+  const StreetParameters& street = camera_.street().parameters();
+  for (int y = 0; y < z.rows; ++y) {
+    for (int x = 0; x < z.cols; ++x) {
+      const float d = core.refined.at<float>(y, x);
+      if (d > 0.0F) {
+        const double expected = street.focal_length * street.baseline / d;
+        ASSERT_NEAR(z.at<float>(y, x), expected, 1e-5 * expected);
+      } else {
+        ASSERT_TRUE(std::isnan(z.at<float>(y, x)));
+      }
+    }
+  }
+}
+
+TEST_F(Chain, subscribesOnlyWhileSomebodyListens) {
+  EXPECT_TRUE(waitFor([this] { return camera_.leftSubscribers() == 0 && camera_.rightSubscribers() == 0; }));
+  {
+    Listener<DisparityImage> refined(nh_, "disparity_refined");
+    ASSERT_TRUE(camera_.waitForChain(refined));
+    EXPECT_GT(camera_.leftSubscribers(), 0);
+  }
+  EXPECT_TRUE(waitFor([this] { return camera_.leftSubscribers() == 0 && camera_.rightSubscribers() == 0; }));
+  {
+    Listener<Image> labels(nh_, "labels");
+    ASSERT_TRUE(waitFor([this] { return camera_.leftSubscribers() > 0; }));
+    EXPECT_EQ(camera_.rightSubscribers(), 0) << "labels need no right image";
+  }
+  EXPECT_TRUE(waitFor([this] { return camera_.leftSubscribers() == 0; }));
+}
+
+TEST_F(Chain, drawsThePicturesThatAreLookedAt) {
+  for (const char* topic :
+       {"disparity_color", "disparity_refined_color", "labels_color", "segment_borders"}) {
+    Listener<Image> picture(nh_, topic);
+    ASSERT_TRUE(camera_.waitForChain(picture)) << topic;
+    const auto message = picture.wait([](const Image&) { return true; });
+    ASSERT_TRUE(message) << topic;
+    EXPECT_EQ(message->encoding, "bgr8") << topic;
+    EXPECT_EQ(message->width, 320U) << topic;
+    EXPECT_EQ(message->height, 120U) << topic;
+    EXPECT_EQ(message->header.frame_id, "stereo_left") << topic;
+    const cv::Mat bgr = imageView(*message, "bgr8", topic);
+    cv::Mat channels[3];
+    cv::split(bgr, channels);
+    EXPECT_GT(cv::norm(channels[0], channels[2], cv::NORM_INF), 50.0) << topic << " has no colour";
+  }
+}
+
+}  // namespace
+}  // namespace disparity_refinement
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "chain_test");
+  ros::AsyncSpinner spinner(1);
+  spinner.start();
+  return RUN_ALL_TESTS();
+}

@@ -1,0 +1,115 @@
+// The test loads the nodelets into its own process, as a manager does, sends images to them by pointer, and
+// compares the addresses of the data that they log at debug level on both ends of every edge.
+
+#include <gtest/gtest.h>
+#include <nodelet/loader.h>
+#include <ros/console.h>
+#include <stereo_msgs/DisparityImage.h>
+
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "ChainClient.hpp"
+
+namespace disparity_refinement {
+namespace {
+
+using sensor_msgs::Image;
+using stereo_msgs::DisparityImage;
+
+std::string address(const std::vector<std::uint8_t>& data) {
+  std::ostringstream text;
+  text << static_cast<const void*>(data.data());
+  return text.str();
+}
+
+/// Addresses that the log says were published or received for a topic and stamp, by nodelet.
+class AddressLog {
+ public:
+  explicit AddressLog(ros::NodeHandle& nh) : listener_(nh, "/rosout") {}
+
+  /// Waits for a line such as "[/stereo/segmentation] published labels 1000.000000000 at 0x..."
+  std::string find(const std::string& nodelet, const std::string& what, const std::string& topic,
+                   const ros::Time& stamp) {
+    std::ostringstream head;
+    head << "[/stereo/" << nodelet << "] " << what << " " << topic << " " << stamp << " at ";
+    const std::string start = head.str();
+    const auto line = listener_.wait(
+        [&start](const rosgraph_msgs::Log& log) { return log.msg.compare(0, start.size(), start) == 0; });
+    return line ? line->msg.substr(start.size()) : "no line '" + start + "'";
+  }
+
+ private:
+  Listener<rosgraph_msgs::Log> listener_;
+};
+
+TEST(ZeroCopy, everyEdgePassesThePointer) {
+  ros::console::set_logger_level("ros.disparity_refinement", ros::console::levels::Debug);
+  ros::console::notifyLoggerLevelsChanged();
+  ros::NodeHandle nh;
+  AddressLog log(nh);
+
+  nodelet::Loader loader(nh);
+  const std::map<std::string, std::string> remappings;
+  const std::vector<std::string> arguments;
+  for (const char* name : {"disparity", "segmentation", "plane_refinement", "visualization"}) {
+    ASSERT_TRUE(loader.load(std::string("/stereo/") + name, std::string("disparity_refinement/") + name,
+                            remappings, arguments));
+  }
+
+  Listener<DisparityImage> raw(nh, "disparity"), refined(nh, "disparity_refined");
+  Listener<Image> labels(nh, "labels"), raw_picture(nh, "disparity_color"),
+      refined_picture(nh, "disparity_refined_color");
+  Listener<Image> labels_picture(nh, "labels_color"), borders(nh, "segment_borders");
+  StereoCamera camera(nh);
+  for (auto* picture : {&raw_picture, &refined_picture, &labels_picture, &borders}) {
+    ASSERT_TRUE(camera.waitForChain(*picture));
+  }
+
+  for (int i = 0; i < 3; ++i) {
+    const ros::Time stamp = camera.stamp(i);
+    const StereoMessages sent = camera.make(i);
+    camera.publish(sent);
+    const auto raw_message = raw.wait(stamp);
+    const auto labels_message = labels.wait(stamp);
+    const auto refined_message = refined.wait(stamp);
+    ASSERT_TRUE(raw_message && labels_message && refined_message && borders.wait(stamp));
+
+    // Into the chain: from the pointer that was published.
+    const std::string left = address(sent.left->data);
+    EXPECT_EQ(log.find("disparity", "received", "left/image_rect", stamp), left);
+    EXPECT_EQ(log.find("disparity", "received", "right/image_rect", stamp), address(sent.right->data));
+    EXPECT_EQ(log.find("segmentation", "received", "left/image_rect", stamp), left);
+    EXPECT_EQ(log.find("visualization", "received", "left/image_rect", stamp), left);
+
+    // Inside the chain: from publisher to subscriber.
+    const std::string disparity = log.find("disparity", "published", "disparity", stamp);
+    EXPECT_EQ(log.find("plane_refinement", "received", "disparity", stamp), disparity);
+    EXPECT_EQ(log.find("visualization", "received", "disparity", stamp), disparity);
+    const std::string labels_address = log.find("segmentation", "published", "labels", stamp);
+    EXPECT_EQ(log.find("plane_refinement", "received", "labels", stamp), labels_address);
+    EXPECT_EQ(log.find("visualization", "received", "labels", stamp), labels_address);
+    const std::string refined_address = log.find("plane_refinement", "published", "disparity_refined", stamp);
+    EXPECT_EQ(log.find("visualization", "received", "disparity_refined", stamp), refined_address);
+
+    // Out of the chain: to a subscriber in the same process.
+    EXPECT_EQ(address(raw_message->image.data), disparity);
+    EXPECT_EQ(address(labels_message->data), labels_address);
+    EXPECT_EQ(address(refined_message->image.data), refined_address);
+
+    const std::set<std::string> distinct = {left, disparity, labels_address, refined_address};
+    EXPECT_EQ(distinct.size(), 4U);
+  }
+}
+
+}  // namespace
+}  // namespace disparity_refinement
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "zero_copy_test");
+  ros::AsyncSpinner spinner(2);
+  spinner.start();
+  return RUN_ALL_TESTS();
+}
