@@ -45,12 +45,12 @@ class VisualizationNodelet : public LazyNodelet {
     monitor_ = std::make_unique<StageMonitor>(getName(), nh, private_nh);
     parameters_ = std::make_unique<LiveParameters<VisualizationConfig>>(private_nh);
     transport_ = std::make_unique<image_transport::ImageTransport>(nh);
-    constexpr std::size_t kPictures = 4;
+    constexpr std::size_t PICTURES = 4;
     worker_ =
-        std::make_unique<FrameWorker<Picture>>(kPictures, *monitor_, [](const Picture& draw) { draw(); });
-    constexpr std::size_t kCacheSize = 30;
+        std::make_unique<FrameWorker<Picture>>(PICTURES, *monitor_, [](const Picture& draw) { draw(); });
+    constexpr std::size_t CACHE_SIZE = 30;
     join_ = std::make_unique<StampJoin<Image, Image>>(
-        kCacheSize,
+        CACHE_SIZE,
         [this](const Image::ConstPtr& image, const Image::ConstPtr& labels) {
           worker_->push([this, image, labels] { drawBorders(image, labels); });
         },

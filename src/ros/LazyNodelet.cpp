@@ -6,7 +6,7 @@ image_transport::Publisher LazyNodelet::advertiseImage(image_transport::ImageTra
                                                        const std::string& topic) {
   const image_transport::SubscriberStatusCallback changed =
       [this](const image_transport::SingleSubscriberPublisher&) { update(); };
-  return transport.advertise(topic, kPublisherQueueSize, changed, changed);
+  return transport.advertise(topic, PUBLISHER_QUEUE_SIZE, changed, changed);
 }
 
 void LazyNodelet::start() {

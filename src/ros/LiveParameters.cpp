@@ -41,9 +41,8 @@ void warnAboutRefused(const ros::NodeHandle& private_nh, const Values& in_force)
 MatchingParameters toParameters(DisparityConfig& config) {
   config.prefilter_size = nextOdd(config.prefilter_size);
   config.correlation_window_size = nextOdd(config.correlation_window_size);
-  if (config.stereo_algorithm == static_cast<int>(StereoAlgorithm::BM)) {
-    config.correlation_window_size = std::max(5, config.correlation_window_size);
-  }
+  const bool is_bm = config.stereo_algorithm == static_cast<int>(StereoAlgorithm::BM);
+  config.correlation_window_size = std::clamp(config.correlation_window_size, is_bm ? 5 : 1, is_bm ? 255 : 31);
   config.disparity_range = config.disparity_range / 16 * 16;
   if (config.fullDP) config.sgbm_mode = static_cast<int>(SgbmMode::HH);
 

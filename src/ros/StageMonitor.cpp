@@ -5,9 +5,9 @@
 namespace disparity_refinement {
 namespace {
 
-const ros::WallDuration kRepeatPeriod(5.0);
+const ros::WallDuration REPEAT_PERIOD(5.0);
 /// Texts remembered for throttling; one that holds a changing number must not fill the memory.
-constexpr std::size_t kRememberedTexts = 32;
+constexpr std::size_t REMEMBERED_TEXTS = 32;
 
 }  // namespace
 
@@ -47,8 +47,8 @@ void StageMonitor::published(const ros::Time& stamp, double milliseconds) {
 bool StageMonitor::isDue(const std::string& text) {
   const ros::WallTime now = ros::WallTime::now();
   const auto found = last_logged_.find(text);
-  if (found != last_logged_.end() && now - found->second < kRepeatPeriod) return false;
-  if (last_logged_.size() >= kRememberedTexts) last_logged_.clear();
+  if (found != last_logged_.end() && now - found->second < REPEAT_PERIOD) return false;
+  if (last_logged_.size() >= REMEMBERED_TEXTS) last_logged_.clear();
   last_logged_[text] = now;
   return true;
 }

@@ -19,7 +19,7 @@ class LazyNodelet : public nodelet::Nodelet {
   template <class Message>
   ros::Publisher advertise(ros::NodeHandle& nh, const std::string& topic) {
     const ros::SubscriberStatusCallback changed = [this](const ros::SingleSubscriberPublisher&) { update(); };
-    return nh.advertise<Message>(topic, kPublisherQueueSize, changed, changed);
+    return nh.advertise<Message>(topic, PUBLISHER_QUEUE_SIZE, changed, changed);
   }
 
   image_transport::Publisher advertiseImage(image_transport::ImageTransport& transport,
@@ -40,7 +40,7 @@ class LazyNodelet : public nodelet::Nodelet {
   }
 
  private:
-  static constexpr int kPublisherQueueSize = 10;
+  static constexpr int PUBLISHER_QUEUE_SIZE = 10;
   void update();
 
   std::mutex mutex_;
