@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <tuple>
 
-#include "disparity_refinement/segmentation/arguments.hpp"
+#include "disparity_refinement/arguments.hpp"
 
 namespace disparity_refinement {
 namespace {

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "disparity_refinement/image_arguments.hpp"
+#include "disparity_refinement/arguments.hpp"
 
 namespace disparity_refinement {
 namespace {
@@ -81,9 +81,10 @@ ProjectionMatrix readProjectionMatrix(const std::string& path, const std::string
     numbers.imbue(std::locale::classic());
     ProjectionMatrix matrix{};
     for (double& entry : matrix) numbers >> entry;
-    if (!numbers || !(numbers >> std::ws).eof())
-      throw std::runtime_error(path + ": " + key + " does not hold exactly 12 numbers");
-    return matrix;
+    if (numbers && (numbers >> std::ws).eof()) return matrix;
+    std::ostringstream message;
+    message << path << ": " << key << " does not hold exactly 12 numbers";
+    throw std::runtime_error(message.str());
   }
   throw std::runtime_error(path + ": no line starts with \"" + prefix + "\"");
 }

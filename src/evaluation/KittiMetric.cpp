@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "disparity_refinement/image_arguments.hpp"
+#include "disparity_refinement/arguments.hpp"
 
 namespace disparity_refinement {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "StreetScene.hpp"
-#include "disparity_refinement/segmentation/arguments.hpp"
+#include "disparity_refinement/arguments.hpp"
 
 namespace disparity_refinement {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <tuple>
 
-#include "disparity_refinement/image_arguments.hpp"
+#include "disparity_refinement/arguments.hpp"
 
 namespace disparity_refinement {
 namespace {
@@ -85,7 +85,7 @@ void requireSearchableSize(const cv::Size& size, const MatchingParameters& p) {
 /// `buffer` is used only if it has to be.
 cv::Mat columns(const cv::Mat& image, int first, int width, cv::Mat& buffer) {
   const int last = first + width;
-  const cv::Mat inside = image.colRange(std::max(first, 0), std::min(last, image.cols));
+  cv::Mat inside = image.colRange(std::max(first, 0), std::min(last, image.cols));
   const int left = std::max(-first, 0);
   const int right = std::max(last - image.cols, 0);
   if (left == 0 && right == 0) return inside;

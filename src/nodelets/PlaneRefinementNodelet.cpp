@@ -4,6 +4,7 @@
 #include <stereo_msgs/DisparityImage.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 #include <stdexcept>
@@ -97,7 +98,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
 
     const auto message =
         makeDisparityImage(in.header, disparity.size(), geometry, range, validWindow(in, disparity.size()));
-    if (in.delta_d > 0.0F) message->delta_d = in.delta_d;
+    if (in.delta_d > 0.0F && std::isfinite(in.delta_d)) message->delta_d = in.delta_d;
     cv::Mat refined =
         imageView(message->image, sensor_msgs::image_encodings::TYPE_32FC1, "disparity_refined");
     try {

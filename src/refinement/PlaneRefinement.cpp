@@ -7,9 +7,8 @@
 #include <limits>
 #include <string>
 
-#include "disparity_refinement/image_arguments.hpp"
+#include "disparity_refinement/arguments.hpp"
 #include "disparity_refinement/refinement/PlaneFit.hpp"
-#include "disparity_refinement/segmentation/arguments.hpp"
 
 namespace disparity_refinement {
 namespace {
@@ -30,7 +29,7 @@ void copyValid(const cv::Mat& disparity, const DisparityRange range, cv::Mat& co
     const float* from = disparity.ptr<float>(y);
     float* to = copy.ptr<float>(y);
     for (int x = 0; x < disparity.cols; ++x) {
-      to[x] = range.isValid(from[x]) && std::isfinite(from[x]) ? from[x] : range.invalid();
+      to[x] = range.isValid(from[x]) ? from[x] : range.invalid();
     }
   }
 }

@@ -42,7 +42,8 @@ MatchingParameters toParameters(DisparityConfig& config) {
   config.prefilter_size = nextOdd(config.prefilter_size);
   config.correlation_window_size = nextOdd(config.correlation_window_size);
   const bool is_bm = config.stereo_algorithm == static_cast<int>(StereoAlgorithm::BM);
-  config.correlation_window_size = std::clamp(config.correlation_window_size, is_bm ? 5 : 1, is_bm ? 255 : 31);
+  config.correlation_window_size =
+      std::clamp(config.correlation_window_size, is_bm ? 5 : 1, is_bm ? 255 : 15);
   config.disparity_range = config.disparity_range / 16 * 16;
   if (config.fullDP) config.sgbm_mode = static_cast<int>(SgbmMode::HH);
 
@@ -66,8 +67,8 @@ MatchingParameters toParameters(DisparityConfig& config) {
 }
 
 SegmentationParameters toParameters(SegmentationConfig& config) {
-  if (config.connectivity != static_cast<int>(Connectivity::EIGHT)) {
-    config.connectivity = static_cast<int>(Connectivity::FOUR);
+  if (config.connectivity != static_cast<int>(Connectivity::FOUR)) {
+    config.connectivity = static_cast<int>(Connectivity::EIGHT);
   }
   SegmentationParameters parameters;
   parameters.lambda = config.lambda;

@@ -134,8 +134,8 @@ DisparityRange disparityRange(const stereo_msgs::DisparityImage& message, const 
 }
 
 StereoGeometry disparityGeometry(const stereo_msgs::DisparityImage& message, const std::string& topic) {
-  if (!(message.f > 0.0F) || !(message.T > 0.0F)) {
-    refuse(topic, "f is ", message.f, " px and T is ", message.T, " m, expected positive values");
+  if (!(message.f > 0.0F) || !(message.T > 0.0F) || !std::isfinite(message.f) || !std::isfinite(message.T)) {
+    refuse(topic, "f is ", message.f, " px and T is ", message.T, " m, expected positive numbers");
   }
   StereoGeometry geometry;
   geometry.focal_length = message.f;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <type_traits>
 #include <utility>
 
 namespace disparity_refinement {
@@ -17,6 +18,9 @@ using sensor_msgs::Image;
 using ExactPolicy = message_filters::sync_policies::ExactTime<Image, CameraInfo, Image, CameraInfo>;
 using ApproximatePolicy =
     message_filters::sync_policies::ApproximateTime<Image, CameraInfo, Image, CameraInfo>;
+
+/// Left and right may run apart by a few messages, however few frames may wait for the stage.
+constexpr int MIN_QUEUE_SIZE = 10;
 
 }  // namespace
 
@@ -33,39 +37,37 @@ StereoSubscriber::StereoSubscriber(const ros::NodeHandle& nh, const ros::NodeHan
   inputs_[RIGHT_IMAGE].topic = nh_.resolveName("right/image_rect");
   inputs_[RIGHT_INFO].topic = nh_.resolveName("right/camera_info");
 
-  resetSynchronizer();
   monitor_.addDiagnostics([this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnose(status); });
   timer_ = nh_.createWallTimer(
       ros::WallDuration(warning_period_), [this](const ros::WallTimerEvent&) { checkForPairs(); }, false,
       false);
 }
 
-void StereoSubscriber::resetSynchronizer() {
-  // The old one disconnects from the filters before the new one connects.
-  synchronizer_.reset();
+std::unique_ptr<StereoSubscriber::Synchronizer> StereoSubscriber::makeSynchronizer() {
+  const auto queue_size = static_cast<std::uint32_t>(std::max(MIN_QUEUE_SIZE, queue_size_));
+  auto result = std::make_unique<Synchronizer>();
+  const auto connect = [this, &result](const auto& policy) {
+    using Policy = std::decay_t<decltype(policy)>;
+    const auto synchronizer = std::make_shared<message_filters::Synchronizer<Policy>>(
+        policy, result->left, result->left_info, result->right, result->right_info);
+    synchronizer->registerCallback(&StereoSubscriber::pair, this);
+    result->policy = synchronizer;
+  };
   if (approximate_) {
-    ApproximatePolicy policy(static_cast<std::uint32_t>(queue_size_));
+    ApproximatePolicy policy(queue_size);
     policy.setInterMessageLowerBound(ros::Duration(max_interval_));
-    using Synchronizer = message_filters::Synchronizer<ApproximatePolicy>;
-    const auto synchronizer =
-        std::make_shared<Synchronizer>(static_cast<const ApproximatePolicy&>(policy), left_filter_,
-                                       left_info_filter_, right_filter_, right_info_filter_);
-    synchronizer->registerCallback(&StereoSubscriber::pair, this);
-    synchronizer_ = synchronizer;
+    connect(policy);
   } else {
-    using Synchronizer = message_filters::Synchronizer<ExactPolicy>;
-    const auto synchronizer =
-        std::make_shared<Synchronizer>(ExactPolicy(static_cast<std::uint32_t>(queue_size_)), left_filter_,
-                                       left_info_filter_, right_filter_, right_info_filter_);
-    synchronizer->registerCallback(&StereoSubscriber::pair, this);
-    synchronizer_ = synchronizer;
+    connect(ExactPolicy(queue_size));
   }
+  return result;
 }
 
 void StereoSubscriber::subscribe() {
   if (subscribed_) return;
   subscribed_ = true;
-  resetSynchronizer();
+  current_ = makeSynchronizer();
+  previous_.reset();
   for (Input& input : inputs_) {
     input.last = ros::Time();
     input.received = 0;
@@ -73,23 +75,27 @@ void StereoSubscriber::subscribe() {
   }
   smallest_offset_ = -1.0;
 
-  const auto queue_size = static_cast<std::uint32_t>(queue_size_);
+  const auto queue_size = static_cast<std::uint32_t>(std::max(MIN_QUEUE_SIZE, queue_size_));
   const image_transport::TransportHints hints("raw", ros::TransportHints().tcpNoDelay(), private_nh_);
   left_ = transport_.subscribe(
       "left/image_rect", queue_size,
-      [this](const sensor_msgs::ImageConstPtr& message) { receive(LEFT_IMAGE, message, left_filter_); },
+      [this](const sensor_msgs::ImageConstPtr& message) {
+        receive(LEFT_IMAGE, message, &Synchronizer::left);
+      },
       ros::VoidPtr(), hints);
   right_ = transport_.subscribe(
       "right/image_rect", queue_size,
-      [this](const sensor_msgs::ImageConstPtr& message) { receive(RIGHT_IMAGE, message, right_filter_); },
+      [this](const sensor_msgs::ImageConstPtr& message) {
+        receive(RIGHT_IMAGE, message, &Synchronizer::right);
+      },
       ros::VoidPtr(), hints);
   left_info_ = nh_.subscribe<CameraInfo>("left/camera_info", queue_size,
                                          [this](const sensor_msgs::CameraInfoConstPtr& message) {
-                                           receive(LEFT_INFO, message, left_info_filter_);
+                                           receive(LEFT_INFO, message, &Synchronizer::left_info);
                                          });
   right_info_ = nh_.subscribe<CameraInfo>("right/camera_info", queue_size,
                                           [this](const sensor_msgs::CameraInfoConstPtr& message) {
-                                            receive(RIGHT_INFO, message, right_info_filter_);
+                                            receive(RIGHT_INFO, message, &Synchronizer::right_info);
                                           });
   timer_.start();
 }
@@ -107,32 +113,33 @@ void StereoSubscriber::unsubscribe() {
 
 template <class Message>
 void StereoSubscriber::receive(InputIndex index, const boost::shared_ptr<const Message>& message,
-                               message_filters::PassThrough<Message>& filter) {
+                               message_filters::PassThrough<Message> Synchronizer::*input) {
   const ros::Time& stamp = message->header.stamp;
   ++inputs_[index].received;
-  if (!acceptStamp(index, stamp)) return;
+  Synchronizer& synchronizer = synchronizerFor(index, stamp);
   measureOffset(index, stamp);
-  filter.add(message);
+  (synchronizer.*input).add(message);
 }
 
-bool StereoSubscriber::acceptStamp(InputIndex index, const ros::Time& stamp) {
+StereoSubscriber::Synchronizer& StereoSubscriber::synchronizerFor(InputIndex index, const ros::Time& stamp) {
   Input& input = inputs_[index];
   if (input.settling) {
     // What is nearer to the time before the jump was still under way when the jump came.
     const bool is_new = (stamp - jump_to_).toSec() < (jump_from_ - stamp).toSec();
     const bool is_caught_up = inputs_[jumped_].last >= jump_from_;
-    if (!is_new && !is_caught_up) return false;
+    if (!is_new && !is_caught_up) return *previous_;
     input.settling = false;
   } else if (stamp < input.last) {
     jumped_ = index;
     jump_from_ = input.last;
     jump_to_ = stamp;
     for (Input& other : inputs_) other.settling = &other != &input && other.last > stamp;
-    resetSynchronizer();
+    previous_ = std::move(current_);
+    current_ = makeSynchronizer();
     monitor_.warning("time jumped back on " + input.topic + ": stereo synchronization starts anew");
   }
   input.last = stamp;
-  return true;
+  return *current_;
 }
 
 void StereoSubscriber::measureOffset(InputIndex index, const ros::Time& stamp) {

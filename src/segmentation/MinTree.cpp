@@ -4,7 +4,7 @@
 #include <limits>
 #include <numeric>
 
-#include "disparity_refinement/segmentation/arguments.hpp"
+#include "disparity_refinement/arguments.hpp"
 
 namespace disparity_refinement {
 

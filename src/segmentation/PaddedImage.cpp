@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "disparity_refinement/image_arguments.hpp"
+#include "disparity_refinement/arguments.hpp"
 
 namespace disparity_refinement {
 

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "BagWriter.hpp"
-#include "disparity_refinement/segmentation/arguments.hpp"
+#include "disparity_refinement/arguments.hpp"
 
 namespace disparity_refinement {
 namespace {

@@ -3,8 +3,8 @@
 
 #include "BagWriter.hpp"
 #include "CommandLine.hpp"
+#include "disparity_refinement/arguments.hpp"
 #include "disparity_refinement/evaluation/SyntheticStreet.hpp"
-#include "disparity_refinement/segmentation/arguments.hpp"
 
 namespace {
 

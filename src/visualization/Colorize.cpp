@@ -7,15 +7,12 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
-#include "disparity_refinement/image_arguments.hpp"
-#include "disparity_refinement/segmentation/arguments.hpp"
+#include "disparity_refinement/arguments.hpp"
 
 namespace disparity_refinement {
 namespace {
 
 const cv::Vec3b BLACK(0, 0, 0);
-
-bool hasDisparity(float d, const DisparityRange& range) { return range.isValid(d) && std::isfinite(d); }
 
 // The colours of the map for 0...255, one row.
 cv::Mat colourTable(int colour_map) {
@@ -59,7 +56,7 @@ void colorizeDisparity(const cv::Mat& disparity, const DisparityRange& range, fl
     cv::Vec3b* out = bgr.ptr<cv::Vec3b>(y);
     for (int x = 0; x < disparity.cols; ++x) {
       const float share = (std::clamp(row[x], scale_min, scale_max) - scale_min) / (scale_max - scale_min);
-      out[x] = hasDisparity(row[x], range) ? colours[cvRound(share * 255.0F)] : BLACK;
+      out[x] = range.isValid(row[x]) ? colours[cvRound(share * 255.0F)] : BLACK;
     }
   }
 }
@@ -105,7 +102,7 @@ void colorizeError(const cv::Mat& disparity, const DisparityRange& range, const 
     for (int x = 0; x < disparity.cols; ++x) {
       if (!(truth[x] > 0.0F)) {
         out[x] = BLACK;
-      } else if (!hasDisparity(measured[x], range)) {
+      } else if (!range.isValid(measured[x])) {
         out[x] = grey;
       } else {
         out[x] = errorColour(std::abs(measured[x] - truth[x]));

@@ -148,8 +148,8 @@ TEST(SegmentationParameters, haveTheDefaultsOfTheHeader) {
   EXPECT_NO_THROW(validate(parameters));
   EXPECT_EQ(30, parameters.lambda);
   EXPECT_EQ(5, parameters.h);
-  EXPECT_EQ(Connectivity::FOUR, parameters.connectivity);
-  EXPECT_EQ(StructuringElement::CROSS, parameters.gradient.structuring_element);
+  EXPECT_EQ(Connectivity::EIGHT, parameters.connectivity);
+  EXPECT_EQ(StructuringElement::SQUARE, parameters.gradient.structuring_element);
   EXPECT_TRUE(parameters.gradient.shadow_enhancement);
   EXPECT_EQ(50, parameters.gradient.shadow_threshold);
   EXPECT_EQ(0.45, parameters.gradient.shadow_gamma);

@@ -22,10 +22,10 @@
 /// What the tests of the nodelets share: a stereo camera, listeners that wait, and the log.
 namespace disparity_refinement {
 
-constexpr double kTimeout = 20.0;  ///< Time that a loaded machine may take for one frame [s].
+constexpr double TIMEOUT = 20.0;  ///< Time that a loaded machine may take for one frame [s].
 
 /// Waits until `condition` holds; false after the timeout.
-inline bool waitFor(const std::function<bool()>& condition, double timeout = kTimeout) {
+inline bool waitFor(const std::function<bool()>& condition, double timeout = TIMEOUT) {
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(timeout);
   while (ros::ok() && ros::WallTime::now() < end) {
     if (condition()) return true;
@@ -54,7 +54,7 @@ class Listener {
   bool isConnected() const { return subscriber_.getNumPublishers() > 0; }
 
   /// The first message for which `matches` holds, null after the timeout.
-  ConstPtr wait(const std::function<bool(const Message&)>& matches, double timeout = kTimeout) {
+  ConstPtr wait(const std::function<bool(const Message&)>& matches, double timeout = TIMEOUT) {
     std::unique_lock<std::mutex> lock(mutex_);
     ConstPtr found;
     arrived_.wait_for(lock, std::chrono::duration<double>(timeout), [&] {
@@ -66,7 +66,7 @@ class Listener {
     return found;
   }
 
-  ConstPtr wait(const ros::Time& stamp, double timeout = kTimeout) {
+  ConstPtr wait(const ros::Time& stamp, double timeout = TIMEOUT) {
     return wait([&stamp](const Message& message) { return message.header.stamp == stamp; }, timeout);
   }
 
@@ -93,7 +93,7 @@ class LogListener {
   explicit LogListener(ros::NodeHandle& nh) : listener_(nh, "/rosout") {}
 
   bool waitFor(const std::vector<std::string>& words, int level = rosgraph_msgs::Log::WARN,
-               double timeout = kTimeout) {
+               double timeout = TIMEOUT) {
     return listener_.wait(
                [&](const rosgraph_msgs::Log& log) {
                  return log.level >= level &&
@@ -182,7 +182,7 @@ class StereoCamera {
   /// one after the other.
   template <class Message>
   bool waitForChain(Listener<Message>& listener) {
-    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(kTimeout);
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(TIMEOUT);
     for (int i = -1000; ros::WallTime::now() < end; ++i) {
       publish(i);
       const auto any = [](const Message&) { return true; };

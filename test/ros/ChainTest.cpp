@@ -34,7 +34,7 @@ CoreResult runCore(const StereoMessages& messages, const SegmentationParameters&
   MatchingParameters matching_parameters;
   matching_parameters.disparity_range = 64;
   PlaneRefinementParameters refinement_parameters;
-  refinement_parameters.min_valid_fraction = 0.2;
+  refinement_parameters.min_valid_fraction = 0.3;
 
   CoreResult result;
   StereoMatcher matcher(matching_parameters);
@@ -74,7 +74,7 @@ class Chain : public testing::Test {
     parameter.name = "h";
     parameter.value = h;
     call.request.config.ints.push_back(parameter);
-    ASSERT_TRUE(ros::service::waitForService("segmentation/set_parameters", ros::Duration(kTimeout)));
+    ASSERT_TRUE(ros::service::waitForService("segmentation/set_parameters", ros::Duration(TIMEOUT)));
     ASSERT_TRUE(ros::service::call("segmentation/set_parameters", call));
   }
 

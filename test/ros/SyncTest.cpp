@@ -170,9 +170,11 @@ TEST(ApproximateSync, rejectsPairsThatAreTooFarApart) {
   EXPECT_EQ(Diagnostics::value(diagnostics.next(), key), rejected + 1);
 }
 
-/// Plays frames in a loop, as `rosbag play --loop` does, a few of them on their way at any time.
+/// Plays frames in a loop, as `rosbag play --loop` does, a few of them on their way at any time. Every loop
+/// ends with left images that have no partner: without care they fill the queues against what is earlier.
 void expectAllOfEveryLoop(Chain& chain, int frames, double right_offset) {
-  constexpr int kLoops = 3, kUnderWay = 2;
+  constexpr int kLoops = 3, kUnderWay = 2, kUnpaired = 10;
+  ros::Publisher left = chain.nh.advertise<Image>("left/image_rect", 100);
   ASSERT_TRUE(chain.connect());
   ASSERT_TRUE(chain.refined.wait(chain.publish(-1, right_offset)));
   for (int loop = 0; loop < kLoops; ++loop) {
@@ -189,17 +191,29 @@ void expectAllOfEveryLoop(Chain& chain, int frames, double right_offset) {
       EXPECT_TRUE(chain.refined.wait(StereoCamera::stamp(i), 0.0)) << "loop " << loop << ", " << i;
     }
     EXPECT_EQ(chain.refined.count(), static_cast<std::size_t>(frames)) << "loop " << loop;
+    for (int i = 0; i < kUnpaired; ++i) left.publish(chain.make(frames + i).left);
   }
 }
 
 TEST(ExactSync, followsTimeThatJumpsBack) {
   Chain chain("exact");
-  for (const int frames : {8, 2, 1}) expectAllOfEveryLoop(chain, frames, 0.0);
+  for (const int frames : {8, 2}) expectAllOfEveryLoop(chain, frames, 0.0);
 }
 
 TEST(ApproximateSync, followsTimeThatJumpsBack) {
   Chain chain("approximate");
   for (const int frames : {8, 2}) expectAllOfEveryLoop(chain, frames, 0.003);
+}
+
+TEST(ExactSync, playsASinglePairAgainAndAgain) {
+  Chain chain("exact");
+  ASSERT_TRUE(chain.connect());
+  for (int loop = 0; loop < 3; ++loop) {
+    for (auto* listener : {&chain.raw, &chain.refined}) listener->clear();
+    const ros::Time stamp = chain.publish(0);
+    EXPECT_TRUE(chain.raw.wait(stamp)) << "loop " << loop;
+    EXPECT_TRUE(chain.refined.wait(stamp)) << "loop " << loop;
+  }
 }
 
 TEST(Overload, dropsAndCountsTheOldestFrames) {

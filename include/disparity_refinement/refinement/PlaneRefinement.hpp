@@ -22,7 +22,7 @@ enum class OutOfRangeAction { INVALIDATE = 0, CLAMP = 1 };
 /// condition.
 struct PlaneRefinementParameters {
   /// RANSAC: largest distance of an inlier to the plane along d [px], > 0.
-  double inlier_threshold = 1.0;
+  double inlier_threshold = 1.5;
   /// RANSAC: probability of having drawn one sample of inliers only, 0 < confidence < 1.
   double confidence = 0.99;
   /// RANSAC: largest slope of a plane along x and y [px/px], > 0.
@@ -36,7 +36,7 @@ struct PlaneRefinementParameters {
   double max_depth_error = 2.0;
 
   /// Condition 2, per segment: least share, 0...1, and least number of pixels with a disparity, >= 3.
-  double min_valid_fraction = 0.3;
+  double min_valid_fraction = 0.2;
   int min_valid_points = 12;
 
   /// Condition 3, per segment: RANSAC meets its stopping rule within this number of trials, >= 1. The rule

@@ -30,7 +30,8 @@ struct StereoFrame {
 /// policy how
 ///   close two messages of one topic can follow each other at least: without it every pair waits for the next
 ///   one.
-/// - A jump back in time (rosbag play --loop) empties the synchronizer.
+/// - A jump back in time (rosbag play --loop) starts a new synchronizer; the old one still gets what was
+/// under way.
 /// - Messages without a pair for a whole warning period: a warning says how many came on each topic, how far
 /// the stamps
 ///   are apart and which parameter to set.
@@ -58,12 +59,20 @@ class StereoSubscriber {
     bool settling = false;  ///< Another topic jumped back in time, this one has not yet.
   };
 
+  /// The synchronizer of message_filters and its four inputs.
+  struct Synchronizer {
+    message_filters::PassThrough<sensor_msgs::Image> left, right;
+    message_filters::PassThrough<sensor_msgs::CameraInfo> left_info, right_info;
+    std::shared_ptr<void> policy;  ///< Last: it is connected to the inputs.
+  };
+
   template <class Message>
   void receive(InputIndex index, const boost::shared_ptr<const Message>& message,
-               message_filters::PassThrough<Message>& filter);
-  bool acceptStamp(InputIndex index, const ros::Time& stamp);
+               message_filters::PassThrough<Message> Synchronizer::*input);
+  /// The synchronizer that a message belongs to: that of before a jump back in time, or the current one.
+  Synchronizer& synchronizerFor(InputIndex index, const ros::Time& stamp);
   void measureOffset(InputIndex index, const ros::Time& stamp);
-  void resetSynchronizer();
+  std::unique_ptr<Synchronizer> makeSynchronizer();
   void pair(const sensor_msgs::ImageConstPtr& left, const sensor_msgs::CameraInfoConstPtr& left_info,
             const sensor_msgs::ImageConstPtr& right, const sensor_msgs::CameraInfoConstPtr& right_info);
   void checkForPairs();
@@ -88,9 +97,7 @@ class StereoSubscriber {
   image_transport::ImageTransport transport_;
   image_transport::Subscriber left_, right_;
   ros::Subscriber left_info_, right_info_;
-  message_filters::PassThrough<sensor_msgs::Image> left_filter_, right_filter_;
-  message_filters::PassThrough<sensor_msgs::CameraInfo> left_info_filter_, right_info_filter_;
-  std::shared_ptr<void> synchronizer_;
+  std::unique_ptr<Synchronizer> current_, previous_;
   ros::WallTimer timer_;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "disparity_refinement/segmentation/arguments.hpp"
+#include "disparity_refinement/arguments.hpp"
 
 namespace disparity_refinement {
 

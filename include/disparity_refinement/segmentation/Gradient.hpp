@@ -9,7 +9,7 @@ enum class StructuringElement { CROSS = 0, SQUARE = 1 };
 
 /// Morphological gradient with shadow enhancement (Lima et al., section III-A).
 struct GradientParameters {
-  StructuringElement structuring_element = StructuringElement::CROSS;
+  StructuringElement structuring_element = StructuringElement::SQUARE;
   /// Stretch weak gradients in dark regions.
   bool shadow_enhancement = true;
   /// A pixel is in the shadow if its gray value is at most this, 0...255 [gray levels].

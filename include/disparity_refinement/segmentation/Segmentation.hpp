@@ -15,7 +15,7 @@ struct SegmentationParameters {
   int lambda = 30;
   /// Smallest depth of a segment's minimum [gray levels of the gradient], 0...255. Larger: fewer segments.
   int h = 5;
-  Connectivity connectivity = Connectivity::FOUR;
+  Connectivity connectivity = Connectivity::EIGHT;
   GradientParameters gradient;
 };
 

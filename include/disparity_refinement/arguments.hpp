@@ -1,11 +1,21 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <sstream>
+#include <stdexcept>
 #include <string>
 
-#include "disparity_refinement/segmentation/arguments.hpp"
-
 namespace disparity_refinement {
+
+/// Throws std::invalid_argument "<name> is <value>, expected <expected>" unless the condition holds.
+template <typename Value>
+void requireArgument(bool condition, const std::string& name, const Value& value,
+                     const std::string& expected) {
+  if (condition) return;
+  std::ostringstream message;
+  message << name << " is " << value << ", expected " << expected;
+  throw std::invalid_argument(message.str());
+}
 
 /// "CV_32FC1 of 1242x375"
 inline std::string describeImage(int type, const cv::Size& size) {

@@ -1,0 +1,42 @@
+#!/usr/bin/env python3
+"""Every parameter of the .cfg files is a launch argument and stands in the README with its default."""
+
+import pathlib
+import re
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+
+
+def parameters():
+    """(nodelet, name, default) of every parameter."""
+    nodelets = {"Disparity": "disparity", "Segmentation": "segmentation", "PlaneRefinement": "plane_refinement",
+                "Visualization": "visualization"}
+    for cfg, nodelet in nodelets.items():
+        text = (ROOT / "cfg" / (cfg + ".cfg")).read_text()
+        for match in re.finditer(r'gen\.add\("(\w+)", \w+, 0,\s*"[^"]*",\s*([^,)]+)', text):
+            yield nodelet, match.group(1), match.group(2).lower()
+
+
+class Parameters(unittest.TestCase):
+
+    def test_there_are_some(self):
+        self.assertGreater(len(list(parameters())), 30)
+
+    def test_each_is_a_launch_argument(self):
+        launch = (ROOT / "launch" / "stereo_refinement.launch").read_text()
+        for nodelet, name, _ in parameters():
+            self.assertIn('<arg name="%s" default=""/>' % name, launch)
+            self.assertIn('name="%s/%s" value="$(arg %s)"' % (nodelet, name, name), launch)
+
+    def test_each_is_in_the_readme_with_its_default(self):
+        readme = (ROOT / "README.md").read_text()
+        for nodelet, name, default in parameters():
+            section = readme.split("### " + nodelet + "\n")[1].split("\n### ")[0]
+            rows = [line.split("|") for line in section.splitlines() if line.startswith("| `%s` |" % name)]
+            self.assertEqual(len(rows), 1, name)
+            self.assertEqual(rows[0][3].strip().replace("\u2212", "-"), default, name)
+
+
+if __name__ == "__main__":
+    unittest.main()
