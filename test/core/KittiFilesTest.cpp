@@ -47,8 +47,8 @@ TEST(KittiFiles, disparityPngHoldsRoundedMultiplesOf256) {
   const TemporaryFile file("disparity.png");
   const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
   const cv::Mat map =
-      (cv::Mat_<float>(2, 5) << -1, 0, 1, 127.9375F, 0.001F, nan, 10.4F / 256, 10.6F / 256, 255.999F, inf);
-  const cv::Mat expected = (cv::Mat_<std::uint16_t>(2, 5) << 0, 1, 256, 32752, 1, 0, 10, 11, 65535, 65535);
+      (cv::Mat_<float>(2, 5) << -1, 0, 1, 127.9375F, 0.001F, nan, 10.4F / 256, 10.6F / 256, 300, inf);
+  const cv::Mat expected = (cv::Mat_<std::uint16_t>(2, 5) << 0, 1, 256, 32752, 1, 0, 10, 11, 65535, 0);
   writeDisparityPng(file.path(), map, RANGE);
   const cv::Mat png = cv::imread(file.path(), cv::IMREAD_UNCHANGED);
   ASSERT_EQ(png.type(), CV_16UC1);

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <map>
 #include <opencv2/core.hpp>
 #include <random>
 #include <set>
@@ -177,14 +178,13 @@ inline Watershed watershed(const cv::Mat& f, Connectivity connectivity) {
     }
   }
 
-  // In this order the targets of a pixel come before it.
-  std::vector<cv::Point> upward = pixels;
-  std::sort(upward.begin(), upward.end(), [&](cv::Point p, cv::Point q) {
-    return std::make_pair(value(p), result.distance.at<int>(p)) <
-           std::make_pair(value(q), result.distance.at<int>(q));
-  });
-  for (const cv::Point p : upward) {
+  // By value and distance: the targets of a pixel come before it.
+  std::multimap<std::pair<int, int>, cv::Point> upward;
+  for (const cv::Point p : pixels) {
     if (result.is_minimum.at<std::uint8_t>(p) != 0) continue;
+    upward.emplace(std::make_pair(value(p), result.distance.at<int>(p)), p);
+  }
+  for (const auto& [order, p] : upward) {
     const std::vector<cv::Point> candidates = result.candidates(f, p, connectivity);
     result.labels.at<int>(p) = result.labels.at<int>(candidates.front());
     for (const cv::Point q : candidates) {

@@ -283,7 +283,8 @@ TEST_F(BadPair, inAnotherEncodingIsGood) {
     ASSERT_TRUE(message) << encoding;
     expectContract(*message);
     if (enc::isBayer(encoding)) {
-      EXPECT_GT(countValid(*message), 0.9 * expected) << encoding;
+      // Demosaicing blurs, so the map is a slightly different one.
+      EXPECT_GT(countValid(*message), 0.8 * expected) << encoding;
     } else {
       EXPECT_EQ(message->image.data, mono->image.data) << encoding;
     }
