@@ -172,7 +172,7 @@ struct Hit {
 /// The street at one moment, seen by two cameras.
 class Scene {
  public:
-  Scene(const StreetParameters& parameters, cv::Point2d principal_point, int frame)
+  Scene(const StreetParameters& parameters, const cv::Point2d& principal_point, int frame)
       : parameters_(parameters),
         principal_point_(principal_point),
         z_(CAMERA_SPEED * frame / SyntheticStreet::FRAME_RATE),

@@ -95,8 +95,9 @@ void drawSample(const cv::Mat& disparity, DisparityRange range, RunSpan runs, in
     }
   }
 
-  sample.origin_x = static_cast<int>(sum_x / sample.size);
-  sample.origin_y = static_cast<int>(sum_y / sample.size);
+  const int points = std::max(n, 1);
+  sample.origin_x = static_cast<int>(sum_x / points);
+  sample.origin_y = static_cast<int>(sum_y / points);
   for (int i = 0; i < sample.size; ++i) {
     sample.x[i] -= static_cast<float>(sample.origin_x);
     sample.y[i] -= static_cast<float>(sample.origin_y);
