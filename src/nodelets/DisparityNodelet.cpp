@@ -5,6 +5,7 @@
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 #include <stdexcept>
+#include <string>
 
 #include "disparity_refinement/matching/StereoMatcher.hpp"
 #include "disparity_refinement/ros/FrameWorker.hpp"
@@ -22,8 +23,9 @@ class DisparityNodelet : public LazyNodelet {
   ~DisparityNodelet() override {
     // First whoever calls this object from another thread.
     stop();
-    subscriber_.reset();
+    if (subscriber_) subscriber_->unsubscribe();
     worker_.reset();
+    subscriber_.reset();
     monitor_.reset();
   }
 
@@ -39,6 +41,7 @@ class DisparityNodelet : public LazyNodelet {
     subscriber_ = std::make_unique<StereoSubscriber>(
         nh, private_nh, *monitor_, [this](const StereoFrame& frame) { worker_->push(frame); });
     publisher_ = advertise<stereo_msgs::DisparityImage>(nh, "disparity");
+    monitor_->start();
     start();
   }
 
@@ -60,6 +63,7 @@ class DisparityNodelet : public LazyNodelet {
     const StereoGeometry geometry = geometryOf(frame);
     const auto left = grayImage(frame.left, subscriber_->leftImageTopic());
     const auto right = grayImage(frame.right, subscriber_->rightImageTopic());
+    warnAboutSize(*frame.left_info, left->image.size());
     const DisparityRange range = matcher_.range(geometry.principal_point_offset);
     const cv::Size size = left->image.size();
 
@@ -84,6 +88,16 @@ class DisparityNodelet : public LazyNodelet {
       throw std::invalid_argument(subscriber_->leftInfoTopic() + ", " + subscriber_->rightInfoTopic() + ": " +
                                   e.what());
     }
+  }
+
+  /// Focal length and baseline are those of the calibrated size. Width and height may be left empty.
+  void warnAboutSize(const sensor_msgs::CameraInfo& info, const cv::Size& size) {
+    if (info.width == 0 || info.height == 0 || info.binning_x > 1 || info.roi.width > 0) return;
+    if (static_cast<int>(info.width) == size.width && static_cast<int>(info.height) == size.height) return;
+    monitor_->warning(subscriber_->leftInfoTopic() + " is that of " + std::to_string(info.width) + "x" +
+                      std::to_string(info.height) + " px, but the image has " + std::to_string(size.width) +
+                      "x" + std::to_string(size.height) +
+                      " px: expected equal sizes, the depth will be wrong");
   }
 
   void warnAboutFrameIds(const StereoFrame& frame) {

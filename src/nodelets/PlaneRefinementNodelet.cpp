@@ -61,6 +61,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
     refined_publisher_ = advertise<Disparity>(nh, "disparity_refined");
     planes_publisher_ = advertise<Planes>(nh, "planes");
     depth_publisher_ = advertise<sensor_msgs::Image>(nh, "depth");
+    monitor_->start();
     start();
   }
 

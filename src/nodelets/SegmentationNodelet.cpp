@@ -45,6 +45,7 @@ class SegmentationNodelet : public LazyNodelet {
     worker_ = std::make_unique<FrameWorker<sensor_msgs::ImageConstPtr>>(
         queue_size_, *monitor_, [this](const sensor_msgs::ImageConstPtr& image) { process(image); });
     publisher_ = advertise<sensor_msgs::Image>(nh, "labels");
+    monitor_->start();
     start();
   }
 

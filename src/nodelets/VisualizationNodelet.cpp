@@ -59,6 +59,7 @@ class VisualizationNodelet : public LazyNodelet {
     refined_publisher_ = advertiseImage(*transport_, "disparity_refined_color");
     labels_publisher_ = advertiseImage(*transport_, "labels_color");
     borders_publisher_ = advertiseImage(*transport_, "segment_borders");
+    monitor_->start();
     start();
   }
 

@@ -1,5 +1,7 @@
 #include "disparity_refinement/ros/LazyNodelet.hpp"
 
+#include <exception>
+
 namespace disparity_refinement {
 
 image_transport::Publisher LazyNodelet::advertiseImage(image_transport::ImageTransport& transport,
@@ -25,7 +27,13 @@ void LazyNodelet::stop() {
 
 void LazyNodelet::update() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (started_) updateSubscriptions();
+  if (!started_) return;
+  try {
+    updateSubscriptions();
+  } catch (const std::exception& e) {
+    // An unknown image_transport, say. It would end the manager, for this is a callback of roscpp.
+    NODELET_ERROR_STREAM("[" << getName() << "] cannot subscribe: " << e.what());
+  }
 }
 
 }  // namespace disparity_refinement

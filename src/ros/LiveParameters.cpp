@@ -45,11 +45,10 @@ MatchingParameters toParameters(DisparityConfig& config) {
   config.correlation_window_size =
       std::clamp(config.correlation_window_size, is_bm ? 5 : 1, is_bm ? 255 : 15);
   config.disparity_range = config.disparity_range / 16 * 16;
-  if (config.fullDP) config.sgbm_mode = static_cast<int>(SgbmMode::HH);
 
   MatchingParameters parameters;
   parameters.stereo_algorithm = static_cast<StereoAlgorithm>(config.stereo_algorithm);
-  parameters.sgbm_mode = static_cast<SgbmMode>(config.sgbm_mode);
+  parameters.sgbm_mode = config.fullDP ? SgbmMode::HH : static_cast<SgbmMode>(config.sgbm_mode);
   parameters.prefilter_size = config.prefilter_size;
   parameters.prefilter_cap = config.prefilter_cap;
   parameters.correlation_window_size = config.correlation_window_size;

@@ -17,9 +17,11 @@ StageMonitor::StageMonitor(const std::string& name, const ros::NodeHandle& nh,
   updater_.setHardwareID("none");
   updater_.add("frames", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { report(status); });
   // Wall time: the updater's own period stands still when the simulated time jumps back.
-  timer_ = private_nh.createWallTimer(ros::WallDuration(1.0),
-                                      [this](const ros::WallTimerEvent&) { updater_.force_update(); });
+  timer_ = private_nh.createWallTimer(
+      ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { updater_.force_update(); }, false, false);
 }
+
+void StageMonitor::start() { timer_.start(); }
 
 void StageMonitor::addDiagnostics(
     const std::function<void(diagnostic_updater::DiagnosticStatusWrapper&)>& task) {

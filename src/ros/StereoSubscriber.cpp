@@ -63,9 +63,10 @@ std::unique_ptr<StereoSubscriber::Synchronizer> StereoSubscriber::makeSynchroniz
   return result;
 }
 
+StereoSubscriber::~StereoSubscriber() { unsubscribe(); }
+
 void StereoSubscriber::subscribe() {
   if (subscribed_) return;
-  subscribed_ = true;
   current_ = makeSynchronizer();
   previous_.reset();
   for (Input& input : inputs_) {
@@ -98,10 +99,10 @@ void StereoSubscriber::subscribe() {
                                             receive(RIGHT_INFO, message, &Synchronizer::right_info);
                                           });
   timer_.start();
+  subscribed_ = true;
 }
 
 void StereoSubscriber::unsubscribe() {
-  if (!subscribed_) return;
   subscribed_ = false;
   timer_.stop();
   problem_.clear();

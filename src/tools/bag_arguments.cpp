@@ -79,6 +79,15 @@ std::vector<ros::Time> stamps(const rosbag::Bag& bag, const std::string& topic) 
   return result;
 }
 
+std::string frameId(const rosbag::Bag& bag, const std::string& topic) {
+  rosbag::View view(bag, rosbag::TopicQuery(topic));
+  for (const rosbag::MessageInstance& message : view) {
+    const auto image = message.instantiate<sensor_msgs::Image>();
+    if (image) return image->header.frame_id;
+  }
+  return "";
+}
+
 /// Distance of a left image to the nearest right one [s]: the median, because a pair may be incomplete.
 double stampOffset(const rosbag::Bag& bag, const StereoTopics& topics) {
   const std::vector<ros::Time> left = stamps(bag, topics.left + "/" + topics.image);
@@ -104,6 +113,7 @@ void printArguments(const std::string& file) {
   std::printf("namespace:=%s\n", parent.empty() ? "/stereo" : parent.c_str());
   std::printf("left:=%s\nright:=%s\nimage:=%s\n", topics.left.c_str(), topics.right.c_str(),
               topics.image.c_str());
+  std::printf("camera_frame:=%s\n", frameId(bag, topics.left + "/" + topics.image).c_str());
   const double offset = stampOffset(bag, topics);
   if (offset > 0.0) {
     std::printf("approximate_sync:=true\napproximate_sync_max_interval:=%.6f\n",

@@ -62,15 +62,17 @@ class FrameWorker {
     while (true) {
       wake_.wait(lock, [this] { return stop_ || !queue_.empty(); });
       if (stop_) return;
-      const Frame frame = std::move(queue_.front());
-      queue_.pop_front();
-      lock.unlock();
-      try {
-        process_(frame);
-      } catch (const std::exception& e) {
-        monitor_.error(e.what());
-      } catch (...) {
-        monitor_.error("unknown exception");
+      {
+        const Frame frame = std::move(queue_.front());
+        queue_.pop_front();
+        lock.unlock();
+        try {
+          process_(frame);
+        } catch (const std::exception& e) {
+          monitor_.error(e.what());
+        } catch (...) {
+          monitor_.error("unknown exception");
+        }
       }
       lock.lock();
     }

@@ -35,8 +35,15 @@ class LazyNodelet : public nodelet::Nodelet {
   virtual void updateSubscriptions() = 0;
 
   template <class Publisher>
-  bool isWanted(const Publisher& publisher) const {
-    return !lazy_ || publisher.getNumSubscribers() > 0;
+  bool isWanted(const Publisher& publisher) {
+    if (!lazy_) return true;
+    const bool is_heard = publisher.getNumSubscribers() > 0;
+    if (is_heard && !was_heard_) {
+      was_heard_ = true;
+      NODELET_INFO_STREAM("[" << getName() << "] first listener, on " << publisher.getTopic()
+                              << ": starting");
+    }
+    return is_heard;
   }
 
  private:
@@ -46,6 +53,7 @@ class LazyNodelet : public nodelet::Nodelet {
   std::mutex mutex_;
   bool started_ = false;
   bool lazy_ = true;
+  bool was_heard_ = false;
 };
 
 }  // namespace disparity_refinement

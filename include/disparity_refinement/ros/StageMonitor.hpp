@@ -17,7 +17,10 @@ class StageMonitor {
  public:
   StageMonitor(const std::string& name, const ros::NodeHandle& nh, const ros::NodeHandle& private_nh);
 
-  /// Adds lines to the diagnostics of the stage. To be called before the first frame.
+  /// Ends the nodelet's onInit(): from here on /diagnostics is published.
+  void start();
+
+  /// Adds lines to the diagnostics of the stage. To be called before start().
   void addDiagnostics(const std::function<void(diagnostic_updater::DiagnosticStatusWrapper&)>& task);
 
   void received();

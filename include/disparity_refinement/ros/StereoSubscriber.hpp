@@ -42,7 +42,11 @@ class StereoSubscriber {
   StereoSubscriber(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, StageMonitor& monitor,
                    Callback callback);
 
+  ~StereoSubscriber();
+
+  /// Throws image_transport::TransportLoadException if there is no such transport.
   void subscribe();
+  /// No callback is under way when it returns.
   void unsubscribe();
 
   const std::string& leftImageTopic() const { return inputs_[LEFT_IMAGE].topic; }
