@@ -12,6 +12,7 @@
 #include <set>
 
 #include "ChainClient.hpp"
+#include "DisparityContract.hpp"
 
 namespace disparity_refinement {
 namespace {
@@ -23,31 +24,6 @@ using stereo_msgs::DisparityImage;
 
 const float kNan = std::numeric_limits<float>::quiet_NaN();
 const float kInfinity = std::numeric_limits<float>::infinity();
-
-/// What consumers rely on, whatever came in: one invalid value, all others inside the range.
-void expectContract(const DisparityImage& message) {
-  EXPECT_GT(message.f, 0.0F);
-  EXPECT_GT(message.T, 0.0F);
-  EXPECT_GT(message.delta_d, 0.0F);
-  EXPECT_GT(message.valid_window.width, 0U);
-  EXPECT_GT(message.valid_window.height, 0U);
-  EXPECT_LE(std::uint64_t{message.valid_window.x_offset} + message.valid_window.width, message.image.width);
-  EXPECT_LE(std::uint64_t{message.valid_window.y_offset} + message.valid_window.height, message.image.height);
-  const cv::Mat map = imageView(message.image, enc::TYPE_32FC1, "disparity_refined");
-  int invalid = 0;
-  for (int y = 0; y < map.rows; ++y) {
-    for (int x = 0; x < map.cols; ++x) {
-      const float d = map.at<float>(y, x);
-      if (d == message.min_disparity - 1.0F) {
-        ++invalid;
-      } else {
-        ASSERT_TRUE(d >= message.min_disparity && d <= message.max_disparity)
-            << d << " at " << x << ", " << y;
-      }
-    }
-  }
-  EXPECT_GT(invalid, 0);
-}
 
 int countValid(const DisparityImage& message) {
   return cv::countNonZero(imageView(message.image, enc::TYPE_32FC1, "disparity") >= message.min_disparity);
