@@ -1,4 +1,3 @@
-#include <image_transport/image_transport.h>
 #include <ros/ros.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/image_encodings.h>
@@ -9,6 +8,7 @@
 #include <pluginlib/class_list_macros.hpp>
 
 #include "disparity_refinement/ros/FrameWorker.hpp"
+#include "disparity_refinement/ros/ImageSubscriber.hpp"
 #include "disparity_refinement/ros/LazyNodelet.hpp"
 #include "disparity_refinement/ros/LiveParameters.hpp"
 #include "disparity_refinement/ros/Messages.hpp"
@@ -41,7 +41,6 @@ class SegmentationNodelet : public LazyNodelet {
     });
     parameters_ = std::make_unique<LiveParameters<SegmentationConfig>>(private_nh);
     queue_size_ = std::max(1, private_nh.param("queue_size", 5));
-    transport_ = std::make_unique<image_transport::ImageTransport>(nh);
     worker_ = std::make_unique<FrameWorker<sensor_msgs::ImageConstPtr>>(
         queue_size_, *monitor_, [this](const sensor_msgs::ImageConstPtr& image) { process(image); });
     publisher_ = advertise<sensor_msgs::Image>(nh, "labels");
@@ -52,11 +51,10 @@ class SegmentationNodelet : public LazyNodelet {
   void updateSubscriptions() override {
     if (!isWanted(publisher_)) {
       subscriber_.shutdown();
-    } else if (!subscriber_) {
-      subscriber_ = transport_->subscribe(
-          "left/image_rect", queue_size_,
-          [this](const sensor_msgs::ImageConstPtr& image) { worker_->push(image); }, ros::VoidPtr(),
-          image_transport::TransportHints("raw", ros::TransportHints().tcpNoDelay(), getPrivateNodeHandle()));
+    } else if (!subscriber_.isSubscribed()) {
+      subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect",
+                            static_cast<std::uint32_t>(queue_size_),
+                            [this](const sensor_msgs::ImageConstPtr& image) { worker_->push(image); });
     }
   }
 
@@ -83,8 +81,7 @@ class SegmentationNodelet : public LazyNodelet {
   std::atomic<int> segments_{0};
   int queue_size_ = 5;
   ros::Publisher publisher_;
-  std::unique_ptr<image_transport::ImageTransport> transport_;
-  image_transport::Subscriber subscriber_;
+  ImageSubscriber subscriber_;
   std::unique_ptr<FrameWorker<sensor_msgs::ImageConstPtr>> worker_;
 };
 

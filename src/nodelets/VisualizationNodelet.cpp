@@ -10,6 +10,7 @@
 #include <string>
 
 #include "disparity_refinement/ros/FrameWorker.hpp"
+#include "disparity_refinement/ros/ImageSubscriber.hpp"
 #include "disparity_refinement/ros/LazyNodelet.hpp"
 #include "disparity_refinement/ros/LiveParameters.hpp"
 #include "disparity_refinement/ros/Messages.hpp"
@@ -81,11 +82,9 @@ class VisualizationNodelet : public LazyNodelet {
     if (!borders) {
       image_subscriber_.shutdown();
       join_->clear();
-    } else if (!image_subscriber_) {
-      image_subscriber_ = transport_->subscribe(
-          "left/image_rect", 1, [this](const Image::ConstPtr& image) { join_->addFirst(image); },
-          ros::VoidPtr(),
-          image_transport::TransportHints("raw", ros::TransportHints(), getPrivateNodeHandle()));
+    } else if (!image_subscriber_.isSubscribed()) {
+      image_subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect", 1,
+                                  [this](const Image::ConstPtr& image) { join_->addFirst(image); });
     }
   }
 
@@ -152,7 +151,7 @@ class VisualizationNodelet : public LazyNodelet {
   image_transport::Publisher disparity_publisher_, refined_publisher_, labels_publisher_, borders_publisher_;
   std::unique_ptr<StampJoin<Image, Image>> join_;
   ros::Subscriber disparity_subscriber_, refined_subscriber_, labels_subscriber_;
-  image_transport::Subscriber image_subscriber_;
+  ImageSubscriber image_subscriber_;
   std::unique_ptr<FrameWorker<Picture>> worker_;
 };
 

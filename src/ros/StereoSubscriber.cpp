@@ -26,7 +26,7 @@ constexpr int MIN_QUEUE_SIZE = 10;
 
 StereoSubscriber::StereoSubscriber(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
                                    StageMonitor& monitor, Callback callback)
-    : nh_(nh), private_nh_(private_nh), monitor_(monitor), callback_(std::move(callback)), transport_(nh) {
+    : nh_(nh), private_nh_(private_nh), monitor_(monitor), callback_(std::move(callback)) {
   approximate_ = private_nh_.param("approximate_sync", false);
   max_interval_ = std::max(1e-6, private_nh_.param("approximate_sync_max_interval", 0.01));
   queue_size_ = std::max(1, private_nh_.param("queue_size", 5));
@@ -77,19 +77,14 @@ void StereoSubscriber::subscribe() {
   smallest_offset_ = -1.0;
 
   const auto queue_size = static_cast<std::uint32_t>(std::max(MIN_QUEUE_SIZE, queue_size_));
-  const image_transport::TransportHints hints("raw", ros::TransportHints().tcpNoDelay(), private_nh_);
-  left_ = transport_.subscribe(
-      "left/image_rect", queue_size,
-      [this](const sensor_msgs::ImageConstPtr& message) {
-        receive(LEFT_IMAGE, message, &Synchronizer::left);
-      },
-      ros::VoidPtr(), hints);
-  right_ = transport_.subscribe(
-      "right/image_rect", queue_size,
-      [this](const sensor_msgs::ImageConstPtr& message) {
-        receive(RIGHT_IMAGE, message, &Synchronizer::right);
-      },
-      ros::VoidPtr(), hints);
+  left_.subscribe(nh_, private_nh_, "left/image_rect", queue_size,
+                  [this](const sensor_msgs::ImageConstPtr& message) {
+                    receive(LEFT_IMAGE, message, &Synchronizer::left);
+                  });
+  right_.subscribe(nh_, private_nh_, "right/image_rect", queue_size,
+                   [this](const sensor_msgs::ImageConstPtr& message) {
+                     receive(RIGHT_IMAGE, message, &Synchronizer::right);
+                   });
   left_info_ = nh_.subscribe<CameraInfo>("left/camera_info", queue_size,
                                          [this](const sensor_msgs::CameraInfoConstPtr& message) {
                                            receive(LEFT_INFO, message, &Synchronizer::left_info);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <image_transport/image_transport.h>
 #include <message_filters/pass_through.h>
 #include <ros/ros.h>
 #include <sensor_msgs/CameraInfo.h>
@@ -11,6 +10,7 @@
 #include <memory>
 #include <string>
 
+#include "disparity_refinement/ros/ImageSubscriber.hpp"
 #include "disparity_refinement/ros/StageMonitor.hpp"
 
 namespace disparity_refinement {
@@ -98,8 +98,7 @@ class StereoSubscriber {
   std::string problem_;  ///< What the last warning said, empty after a pair.
 
   bool subscribed_ = false;
-  image_transport::ImageTransport transport_;
-  image_transport::Subscriber left_, right_;
+  ImageSubscriber left_, right_;
   ros::Subscriber left_info_, right_info_;
   std::unique_ptr<Synchronizer> current_, previous_;
   ros::WallTimer timer_;
