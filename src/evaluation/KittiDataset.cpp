@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <locale>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <tuple>
@@ -181,32 +182,70 @@ std::vector<KittiFrame> openRaw(const fs::path& folder, const CameraNames& camer
   return frames;
 }
 
-std::vector<KittiFrame> openBenchmark(const fs::path& folder, const CameraNames& camera, double rate) {
-  const std::string end = "_10.png";
-  std::vector<KittiFrame> frames =
-      pairImages(folder / ("image_" + camera.left), folder / ("image_" + camera.right), end);
-  const auto ground_truth = [&](const char* kind, const KittiFrame& frame) -> std::string {
-    if (!fs::is_directory(folder / kind)) return "";
-    const fs::path file = folder / kind / (frame.name + ".png");
-    requireFile(file, "the ground truth of " + frame.left);
-    return file.string();
-  };
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    KittiFrame& frame = frames[i];
-    const std::string number = frame.name.substr(0, frame.name.find('_'));
+/// Image, calibration and ground truth of one frame of the stereo benchmark, whether or not they exist.
+struct BenchmarkFiles {
+  fs::path folder;
+  CameraNames camera;
+
+  KittiFrame open(const std::string& name) const {
+    KittiFrame frame;
+    frame.name = fs::path(name).stem().string();
+    frame.left = image(camera.left, name, "left");
+    frame.right = image(camera.right, name, "right");
+    const std::string number = name.substr(0, name.find('_'));
     readProjections(folder / "calib" / (number + ".txt"), "P" + camera.left, "P" + camera.right)
         .assignTo(frame);
-    frame.disp_noc = ground_truth("disp_noc", frame);
-    frame.disp_occ = ground_truth("disp_occ", frame);
-    frame.left_stamp = frame.right_stamp =
-        EPOCH + std::llround(static_cast<double>(i) / rate * static_cast<double>(SECOND));
+    frame.disp_noc = groundTruth("disp_noc", name);
+    frame.disp_occ = groundTruth("disp_occ", name);
+    return frame;
   }
+
+  fs::path images(const std::string& camera_name) const { return folder / ("image_" + camera_name); }
+
+ private:
+  std::string image(const std::string& camera_name, const std::string& name, const std::string& side) const {
+    const fs::path file = images(camera_name) / name;
+    requireFile(file, "the " + side + " image of frame " + fs::path(name).stem().string());
+    return file.string();
+  }
+
+  std::string groundTruth(const char* kind, const std::string& name) const {
+    if (!fs::is_directory(folder / kind)) return "";
+    const fs::path file = folder / kind / name;
+    requireFile(file, "the ground truth of frame " + fs::path(name).stem().string());
+    return file.string();
+  }
+};
+
+std::vector<KittiFrame> openBenchmark(const fs::path& folder, const CameraNames& camera, double rate,
+                                      std::vector<std::string>* incomplete) {
+  const BenchmarkFiles files{folder, camera};
+  std::set<std::string> names;
+  for (const std::string& side : {camera.left, camera.right}) {
+    const std::vector<std::string> images = listFiles(files.images(side), "_10.png");
+    names.insert(images.begin(), images.end());
+  }
+  std::vector<KittiFrame> frames;
+  std::int64_t index = 0;
+  for (const std::string& name : names) {
+    try {
+      frames.push_back(files.open(name));
+      frames.back().left_stamp = frames.back().right_stamp =
+          EPOCH + std::llround(static_cast<double>(index) / rate * static_cast<double>(SECOND));
+    } catch (const std::runtime_error& error) {
+      if (incomplete == nullptr) throw;
+      incomplete->emplace_back(error.what());
+    }
+    ++index;
+  }
+  if (frames.empty()) fail(folder, "no frame is complete: ", incomplete->front());
   return frames;
 }
 
 }  // namespace
 
-KittiDataset openKittiDataset(const std::string& folder, KittiCameras cameras, double benchmark_rate) {
+KittiDataset openKittiDataset(const std::string& folder, KittiCameras cameras, double benchmark_rate,
+                              std::vector<std::string>* incomplete) {
   requireArgument(benchmark_rate > 0.0 && std::isfinite(benchmark_rate), "benchmark_rate", benchmark_rate,
                   "a positive number");
   const fs::path path(folder);
@@ -221,7 +260,7 @@ KittiDataset openKittiDataset(const std::string& folder, KittiCameras cameras, d
          "stereo benchmark folder (image_0, image_1, calib)");
   }
   if (has("calib") || has("disp_noc") || has("disp_occ")) {
-    return {KittiLayout::STEREO_BENCHMARK, openBenchmark(path, camera, benchmark_rate)};
+    return {KittiLayout::STEREO_BENCHMARK, openBenchmark(path, camera, benchmark_rate, incomplete)};
   }
   return {KittiLayout::ODOMETRY, openOdometry(path, camera)};
 }

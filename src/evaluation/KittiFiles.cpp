@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <fstream>
 #include <locale>
 #include <opencv2/imgcodecs.hpp>
@@ -17,8 +16,6 @@ namespace {
 
 // Value of the PNG for 1 px; 0 stands for "no disparity".
 constexpr float PNG_SCALE = 256.0F;
-constexpr float PNG_MIN = 1.0F;
-constexpr float PNG_MAX = 65535.0F;
 
 std::ifstream openFile(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -51,18 +48,22 @@ cv::Mat readDisparityPng(const std::string& path) {
   return disparity;
 }
 
-void writeDisparityPng(const std::string& path, const cv::Mat& disparity, const DisparityRange& range) {
+cv::Mat roundToKittiPng(const cv::Mat& disparity, const DisparityRange& range) {
   requireImage(disparity, "disparity", CV_32FC1);
-  cv::Mat png(disparity.size(), CV_16UC1);
+  cv::Mat rounded(disparity.size(), CV_32FC1);
   for (int y = 0; y < disparity.rows; ++y) {
-    for (int x = 0; x < disparity.cols; ++x) {
-      const float d = disparity.at<float>(y, x);
-      png.at<std::uint16_t>(y, x) =
-          range.isValid(d)
-              ? static_cast<std::uint16_t>(std::lround(std::clamp(d * PNG_SCALE, PNG_MIN, PNG_MAX)))
-              : std::uint16_t{0};
-    }
+    const float* row = disparity.ptr<float>(y);
+    std::transform(row, row + disparity.cols, rounded.ptr<float>(y), [&range](float d) {
+      if (!range.isValid(d)) return 0.0F;
+      return std::round(std::clamp(d, KITTI_PNG_RANGE.min, KITTI_PNG_RANGE.max) * PNG_SCALE) / PNG_SCALE;
+    });
   }
+  return rounded;
+}
+
+void writeDisparityPng(const std::string& path, const cv::Mat& disparity, const DisparityRange& range) {
+  cv::Mat png;
+  roundToKittiPng(disparity, range).convertTo(png, CV_16UC1, PNG_SCALE);
   std::vector<uchar> bytes;
   cv::imencode(".png", png, bytes);
   std::ofstream file(path, std::ios::binary);
@@ -90,5 +91,16 @@ ProjectionMatrix readProjectionMatrix(const std::string& path, const std::string
 }
 
 cv::Mat readGrayImage(const std::string& path) { return readImage(path, cv::IMREAD_GRAYSCALE); }
+
+cv::Mat readColorImage(const std::string& path) { return readImage(path, cv::IMREAD_COLOR); }
+
+void requireSizeOfLeftImage(const std::string& path, const cv::Mat& image, const cv::Size& left) {
+  if (image.size() == left) return;
+  const auto text = [](const cv::Size& size) {
+    return std::to_string(size.width) + "x" + std::to_string(size.height);
+  };
+  throw std::runtime_error(path + ": " + text(image.size()) + " pixels, expected " + text(left) +
+                           " as the left image");
+}
 
 }  // namespace disparity_refinement

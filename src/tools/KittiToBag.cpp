@@ -1,8 +1,6 @@
 #include "KittiToBag.hpp"
 
 #include <algorithm>
-#include <opencv2/imgcodecs.hpp>
-#include <stdexcept>
 
 #include "BagWriter.hpp"
 #include "disparity_refinement/arguments.hpp"
@@ -10,34 +8,17 @@
 namespace disparity_refinement {
 namespace {
 
-std::string toString(const cv::Size& size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-
-void requireSize(const std::string& file, const cv::Mat& image, const cv::Size& size) {
-  if (image.size() != size) {
-    throw std::runtime_error(file + ": " + toString(image.size()) + " pixels, expected " + toString(size) +
-                             " as the left image");
-  }
-}
-
-cv::Mat readColorImage(const std::string& file) {
-  cv::Mat image = cv::imread(file, cv::IMREAD_COLOR);
-  if (image.empty()) throw std::runtime_error(file + " is not a readable image");
-  return image;
-}
-
 BagFrame readFrame(const KittiFrame& files, const KittiToBagOptions& options) {
   const bool is_gray = options.cameras == KittiCameras::GRAY;
   const auto read = is_gray ? readGrayImage : readColorImage;
   BagFrame frame;
   frame.left = read(files.left);
   frame.right = read(files.right);
-  requireSize(files.right, frame.right, frame.left.size());
+  requireSizeOfLeftImage(files.right, frame.right, frame.left.size());
   const std::string& ground_truth = files.disp_noc.empty() ? files.disp_occ : files.disp_noc;
   if (is_gray && !ground_truth.empty()) {
     frame.disparity = readDisparityPng(ground_truth);
-    requireSize(ground_truth, frame.disparity, frame.left.size());
+    requireSizeOfLeftImage(ground_truth, frame.disparity, frame.left.size());
   }
   frame.left_projection = files.left_projection;
   frame.right_projection = files.right_projection;

@@ -147,6 +147,37 @@ TEST(KittiDataset, missingFilesAreNamed) {
   }
 }
 
+TEST(KittiDataset, incompleteFramesOfTheBenchmarkAreLeftOutWhenAsked) {
+  for (const char* name : {"image_1/000004_10.png", "image_0/000004_10.png", "calib/000004.txt",
+                           "disp_noc/000004_10.png", "disp_occ/000004_10.png"}) {
+    const TemporaryFolder folder;
+    const fs::path training = folder / "training";
+    writeBenchmark(training);
+    fs::remove(training / name);
+    std::vector<std::string> incomplete;
+    const KittiDataset dataset = openKittiDataset(training.string(), KittiCameras::GRAY, 10.0, &incomplete);
+    ASSERT_EQ(dataset.frames.size(), 1U) << name;
+    EXPECT_EQ(dataset.frames[0].name, "000000_10") << name;
+    ASSERT_EQ(incomplete.size(), 1U) << name;
+    EXPECT_EQ(incomplete[0].find((training / name).string()), 0U) << incomplete[0];
+  }
+}
+
+TEST(KittiDataset, aBenchmarkWithoutACompleteFrameIsRefused) {
+  const TemporaryFolder folder;
+  const fs::path training = folder / "training";
+  writeBenchmark(training);
+  fs::remove_all(training / "calib");
+  std::vector<std::string> incomplete;
+  try {
+    openKittiDataset(training.string(), KittiCameras::GRAY, 10.0, &incomplete);
+    ADD_FAILURE() << "nothing was thrown";
+  } catch (const std::runtime_error& error) {
+    EXPECT_EQ(std::string(error.what()).find(training.string() + ": no frame is complete: "), 0U)
+        << error.what();
+  }
+}
+
 TEST(KittiDataset, aFolderWithoutImagesIsRefused) {
   const TemporaryFolder folder;
   writeOdometry(folder / "00");

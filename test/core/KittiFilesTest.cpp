@@ -63,6 +63,33 @@ TEST(KittiFiles, negativeValidDisparitiesBecomeTheSmallestValue) {
   EXPECT_EQ(cv::norm(readDisparityPng(file.path()), expected, cv::NORM_INF), 0.0);
 }
 
+TEST(KittiFiles, roundingIsWhatAPngGivesBack) {
+  const TemporaryFile file("rounded.png");
+  cv::Mat map(40, 50, CV_32FC1);
+  cv::RNG random(1);
+  random.fill(map, cv::RNG::UNIFORM, -3.0, 300.0);
+  map.at<float>(0, 0) = std::numeric_limits<float>::quiet_NaN();
+  map.at<float>(0, 1) = std::numeric_limits<float>::infinity();
+  const DisparityRange range{-2.0F, 126.0F};
+  writeDisparityPng(file.path(), map, range);
+  const cv::Mat rounded = roundToKittiPng(map, range);
+  EXPECT_EQ(cv::norm(rounded, readDisparityPng(file.path()), cv::NORM_INF), 0.0);
+  EXPECT_EQ(cv::norm(rounded, roundToKittiPng(rounded, KITTI_PNG_RANGE), cv::NORM_INF), 0.0)
+      << "once is enough";
+  EXPECT_THROW(roundToKittiPng(cv::Mat(2, 2, CV_16SC1), range), std::invalid_argument);
+}
+
+TEST(KittiFiles, sizesAreComparedWithTheLeftImage) {
+  const cv::Mat image(3, 4, CV_8UC1);
+  EXPECT_NO_THROW(requireSizeOfLeftImage("a.png", image, {4, 3}));
+  try {
+    requireSizeOfLeftImage("a.png", image, {5, 3});
+    ADD_FAILURE() << "nothing was thrown";
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "a.png: 4x3 pixels, expected 5x3 as the left image");
+  }
+}
+
 TEST(KittiFiles, disparityPngIsReadInPixels) {
   const TemporaryFile file("read.png");
   const cv::Mat png = (cv::Mat_<std::uint16_t>(1, 4) << 0, 1, 384, 65535);

@@ -43,9 +43,12 @@ struct KittiDataset {
 /// 2011-09-26 UTC, the day of KITTI's first drive, since ROS takes a time of 0 for "unknown".
 ///
 /// @param benchmark_rate  Frames of a STEREO_BENCHMARK per second, > 0.
+/// @param incomplete      If given, the frames of a STEREO_BENCHMARK that lack a file are left out, and what
+/// is
+///                        missing is told here; without it the first one throws.
 /// Throws std::runtime_error that names the file and what was expected if one is missing or does not fit to
 /// the others, std::invalid_argument for a bad rate.
 KittiDataset openKittiDataset(const std::string& folder, KittiCameras cameras = KittiCameras::GRAY,
-                              double benchmark_rate = 10.0);
+                              double benchmark_rate = 10.0, std::vector<std::string>* incomplete = nullptr);
 
 }  // namespace disparity_refinement
