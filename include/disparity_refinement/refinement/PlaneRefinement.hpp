@@ -36,7 +36,7 @@ struct PlaneRefinementParameters {
   double max_depth_error = 2.0;
 
   /// Condition 2, per segment: least share, 0...1, and least number of pixels with a disparity, >= 3.
-  double min_valid_fraction = 0.2;
+  double min_valid_fraction = 0.1;
   int min_valid_points = 12;
 
   /// Condition 3, per segment: RANSAC meets its stopping rule within this number of trials, >= 1. The rule
