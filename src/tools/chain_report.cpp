@@ -13,15 +13,13 @@
 #include <fstream>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "disparity_refinement/evaluation/KittiMetric.hpp"
 #include "disparity_refinement/ros/Messages.hpp"
-#include "disparity_refinement/visualization/Colorize.hpp"
-#include "disparity_refinement/visualization/Panels.hpp"
+#include "disparity_refinement/visualization/RefinementPicture.hpp"
 
 namespace disparity_refinement {
 namespace {
@@ -195,33 +193,17 @@ class ChainReport {
 
   void drawPicture(const Frame& frame, const cv::Mat& truth) const {
     const auto gray = grayImage(frame.image, image_.getTopic());
-    const DisparityRange raw_range = disparityRange(*frame.raw, raw_.getTopic());
-    const DisparityRange refined_range = disparityRange(*frame.refined, refined_.getTopic());
     const std::string encoding = sensor_msgs::image_encodings::TYPE_32FC1;
-    const cv::Mat raw = imageView(frame.raw->image, encoding, raw_.getTopic());
-    const cv::Mat refined = imageView(frame.refined->image, encoding, refined_.getTopic());
-    const cv::Mat labels =
-        imageView(*frame.labels, sensor_msgs::image_encodings::TYPE_32SC1, labels_.getTopic());
-    // One scale for both maps.
-    const float scale_max = std::min(64.0F, refined_range.max);
-
-    std::vector<Panel> panels(4);
-    panels[0] = {"left image", gray->image};
-    panels[1].title = "segments";
-    drawSegmentBorders(gray->image, labels, panels[1].picture);
-    panels[2].title = "disparity";
-    colorizeDisparity(raw, raw_range, refined_range.min, scale_max, panels[2].picture);
-    panels[3].title = "refined disparity";
-    colorizeDisparity(refined, refined_range, refined_range.min, scale_max, panels[3].picture);
-    if (!truth.empty()) {
-      panels.resize(6);
-      panels[4].title = "error of the disparity";
-      colorizeError(raw, raw_range, truth, panels[4].picture);
-      panels[5].title = "error of the refined disparity";
-      colorizeError(refined, refined_range, truth, panels[5].picture);
-    }
+    RefinementPicture picture;
+    picture.image = gray->image;
+    picture.labels = imageView(*frame.labels, sensor_msgs::image_encodings::TYPE_32SC1, labels_.getTopic());
+    picture.disparity = imageView(frame.raw->image, encoding, raw_.getTopic());
+    picture.disparity_range = disparityRange(*frame.raw, raw_.getTopic());
+    picture.refined = imageView(frame.refined->image, encoding, refined_.getTopic());
+    picture.refined_range = disparityRange(*frame.refined, refined_.getTopic());
+    picture.ground_truth = truth;
     const std::string file = folder_ + format("/frame_%04d.png", finished_);
-    if (!cv::imwrite(file, arrangePanels(panels, 2))) throw std::runtime_error(file + " cannot be written");
+    if (!cv::imwrite(file, drawRefinement(picture))) throw std::runtime_error(file + " cannot be written");
   }
 
   ros::NodeHandle nh_, private_nh_;
