@@ -52,7 +52,11 @@ ProgressLine::~ProgressLine() {
 
 void ProgressLine::show(int done, int total) {
   if (!is_terminal_) return;
-  std::fprintf(stderr, "\r%d of %d frames", done, total);
+  constexpr int WIDTH = 40;
+  const int filled = total > 0 ? static_cast<int>(static_cast<long long>(WIDTH) * done / total) : WIDTH;
+  const std::string bar = std::string(static_cast<std::size_t>(filled), '#') +
+                          std::string(static_cast<std::size_t>(WIDTH - filled), '.');
+  std::fprintf(stderr, "\r[%s] %d of %d frames", bar.c_str(), done, total);
   is_shown_ = true;
 }
 

@@ -22,7 +22,7 @@ bool parseCommandLine(int argc, const char* const* argv, const std::string& usag
                       boost::program_options::options_description options,
                       boost::program_options::variables_map& values);
 
-/// A counter on stderr, if that is a terminal.
+/// A progress bar on stderr, if that is a terminal.
 class ProgressLine {
  public:
   ProgressLine();

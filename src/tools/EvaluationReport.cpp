@@ -1,0 +1,165 @@
+#include "EvaluationReport.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <ostream>
+#include <stdexcept>
+
+namespace disparity_refinement {
+namespace {
+
+using Json = nlohmann::json;
+
+template <class... Arguments>
+std::string format(const char* pattern, Arguments... arguments) {
+  char text[128];
+  std::snprintf(text, sizeof text, pattern, arguments...);
+  return text;
+}
+
+std::string padded(const std::string& text, std::size_t width) {
+  return text + std::string(width - std::min(width, text.size()), ' ');
+}
+
+std::string cells(const DisparityErrors& errors) {
+  std::string text = "  |";
+  for (const double outliers : errors.outliers) text += format(" %6.2f", 100.0 * outliers);
+  return text + format(" %6.3f", errors.end_point_error);
+}
+
+bool isComputed(const EvaluatedMethod& method) { return method.maps.empty(); }
+
+bool hasSegments(const EvaluatedMethod& method) { return isComputed(method) && method.is_refined; }
+
+Json toJson(const DisparityErrors& errors) {
+  Json json;
+  for (std::size_t i = 0; i < errors.outliers.size(); ++i) {
+    json[std::to_string(i + 1)] = 100.0 * errors.outliers[i];
+  }
+  json["epe"] = errors.end_point_error;
+  return json;
+}
+
+Json parametersOf(const EvaluatedMethod& method) {
+  Json json = Json::object();
+  if (!isComputed(method)) return json;
+  const StageParameters& parameters = method.parameters;
+  for (const auto& [name, value] : method.is_refined ? parameters.values() : parameters.matchingValues()) {
+    std::visit([&json, &name = name](auto v) { json[name] = v; }, value);
+  }
+  return json;
+}
+
+Json toJson(const EvaluatedMethod& method, const EvaluationFigures& mean, std::size_t frames) {
+  Json json;
+  json["name"] = method.name;
+  json["frames"] = frames;
+  json["parameters"] = parametersOf(method);
+  json["segments"] = hasSegments(method) ? Json(mean.segments) : Json();
+  const auto time = [&method](double ms) { return isComputed(method) ? Json(ms) : Json(); };
+  json["ms"] = {{"matching", time(mean.ms.matching)},
+                {"segmentation", time(mean.ms.segmentation)},
+                {"refinement", time(mean.ms.refinement)},
+                {"total", time(mean.ms.total())}};
+  for (const auto& [kind, score] : mean.scores) {
+    json[kind] = {{"density", 100.0 * score.density}, {"all", toJson(score.all)}, {"est", toJson(score.est)}};
+  }
+  return json;
+}
+
+void writeFile(const std::string& file, const std::string& text) {
+  std::ofstream stream(file);
+  stream << text;
+  stream.close();
+  if (!stream) throw std::runtime_error("cannot write " + file);
+}
+
+std::string csvLines(const EvaluatedMethod& method, const std::string& frame,
+                     const EvaluationFigures& figures) {
+  std::string text;
+  for (const auto& [kind, score] : figures.scores) {
+    // Names hold commas.
+    text += "\"" + method.name + "\"," + frame + "," + kind + format(",%.6f", 100.0 * score.density);
+    for (const DisparityErrors& errors : {score.all, score.est}) {
+      for (const double outliers : errors.outliers) text += format(",%.6f", 100.0 * outliers);
+      text += format(",%.6f", errors.end_point_error);
+    }
+    text += hasSegments(method) ? format(",%.2f", figures.segments) : ",";
+    text += isComputed(method) ? format(",%.3f,%.3f,%.3f,%.3f", figures.ms.matching, figures.ms.segmentation,
+                                        figures.ms.refinement, figures.ms.total())
+                               : ",,,,";
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+void printTables(const Evaluation& evaluation, std::ostream& out) {
+  std::vector<EvaluationFigures> means;
+  std::size_t width = 6;
+  for (std::size_t m = 0; m < evaluation.methods.size(); ++m) {
+    means.push_back(evaluation.mean(m));
+    width = std::max(width, evaluation.methods[m].name.size());
+  }
+  for (const auto& entry : means.front().scores) {
+    const std::string& kind = entry.first;
+    out << "disp_" << kind << ", " << evaluation.frames.size()
+        << " frames: mean of their rates of pixels wrong by more than 1 ... 5 px [%], end-point error [px]\n"
+        << std::string(width, ' ')
+        << "           | all, holes interpolated                    | est, without holes\n"
+        << padded("method", width) << "  density";
+    for (int column = 0; column < 2; ++column) out << "  |    > 1    > 2    > 3    > 4    > 5    epe";
+    out << "\n";
+    for (std::size_t m = 0; m < means.size(); ++m) {
+      const KittiScore& score = means[m].scores.at(kind);
+      out << padded(evaluation.methods[m].name, width) << format("  %7.2f", 100.0 * score.density)
+          << cells(score.all) << cells(score.est) << "\n";
+    }
+    out << "\n";
+  }
+
+  out << padded("method", width) << "  segments  matching [ms]  segmentation  refinement    total\n";
+  for (std::size_t m = 0; m < means.size(); ++m) {
+    const EvaluatedMethod& method = evaluation.methods[m];
+    const StageTimes& ms = means[m].ms;
+    if (!isComputed(method)) continue;
+    out << padded(method.name, width)
+        << (hasSegments(method) ? format("  %8.1f", means[m].segments) : format("  %8s", "-"))
+        << format("  %13.1f  %12.1f  %10.1f  %7.1f\n", ms.matching, ms.segmentation, ms.refinement,
+                  ms.total());
+  }
+  if (!evaluation.left_out.empty()) {
+    out << "\nLeft out, " << evaluation.left_out.size() << " frames:\n";
+    for (const std::string& reason : evaluation.left_out) out << "  " << reason << "\n";
+  }
+}
+
+void writeJson(const Evaluation& evaluation, const std::string& file) {
+  Json json = Json::array();
+  for (std::size_t m = 0; m < evaluation.methods.size(); ++m) {
+    json.push_back(toJson(evaluation.methods[m], evaluation.mean(m), evaluation.frames.size()));
+  }
+  writeFile(file, json.dump(2) + "\n");
+}
+
+void writeCsv(const Evaluation& evaluation, const std::string& file) {
+  std::string text = "method,frame,ground_truth,density";
+  for (const std::string kind : {"all", "est"}) {
+    for (int tau = 1; tau <= 5; ++tau) text += "," + kind + "_" + std::to_string(tau);
+    text += "," + kind + "_epe";
+  }
+  text += ",segments,matching_ms,segmentation_ms,refinement_ms,total_ms\n";
+  for (std::size_t m = 0; m < evaluation.methods.size(); ++m) {
+    const EvaluatedMethod& method = evaluation.methods[m];
+    for (std::size_t i = 0; i < evaluation.frames.size(); ++i) {
+      text += csvLines(method, evaluation.frames[i], evaluation.figures[m][i]);
+    }
+    text += csvLines(method, "mean", evaluation.mean(m));
+  }
+  writeFile(file, text);
+}
+
+}  // namespace disparity_refinement

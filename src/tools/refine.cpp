@@ -1,0 +1,196 @@
+#include <cstdio>
+#include <iostream>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
+
+#include "CommandLine.hpp"
+#include "PointCloudFile.hpp"
+#include "StageParameters.hpp"
+#include "disparity_refinement/arguments.hpp"
+#include "disparity_refinement/evaluation/KittiFiles.hpp"
+#include "disparity_refinement/visualization/Colorize.hpp"
+#include "disparity_refinement/visualization/RefinementPicture.hpp"
+
+namespace disparity_refinement {
+namespace {
+
+namespace po = boost::program_options;
+
+constexpr const char* USAGE =
+    R"(Usage: refine LEFT RIGHT [options]
+
+Computes the refined disparity map of one rectified stereo pair. Without an option that
+says what to write, it writes disparity_refined.png (KITTI's 16-bit PNG) and
+disparity_refined_color.png. Focal length and baseline are needed for the point cloud and
+the bound on the depth error, condition 1; without them the bound is off.
+)";
+
+constexpr const char* DEFAULT_PNG = "disparity_refined.png";
+constexpr const char* DEFAULT_COLOR = "disparity_refined_color.png";
+
+struct Calibration {
+  ProjectionMatrix left{};
+  StereoGeometry geometry;
+};
+
+struct Outputs {
+  std::string png, color, pfm, ply, picture;
+  float color_max = 64.0F;  ///< Near end of the colour scale [px]
+
+  bool any() const {
+    return !png.empty() || !color.empty() || !pfm.empty() || !ply.empty() || !picture.empty();
+  }
+};
+
+/// The matrices of a KITTI calibration file, as the odometry data and the benchmark or as the raw data name
+/// them.
+Calibration readCalibration(const std::string& file) {
+  Calibration calibration;
+  ProjectionMatrix right{};
+  try {
+    calibration.left = readProjectionMatrix(file, "P0");
+    right = readProjectionMatrix(file, "P1");
+  } catch (const std::runtime_error& error) {
+    try {
+      calibration.left = readProjectionMatrix(file, "P_rect_00");
+      right = readProjectionMatrix(file, "P_rect_01");
+    } catch (const std::runtime_error&) {
+      throw error;
+    }
+  }
+  calibration.geometry = stereoGeometry(calibration.left, right);
+  return calibration;
+}
+
+std::optional<Calibration> calibrationOf(const po::variables_map& values, const cv::Size& size) {
+  const bool has_focal_length = values.count("focal-length") > 0, has_baseline = values.count("baseline") > 0;
+  if (values.count("calibration") > 0) {
+    if (has_focal_length || has_baseline) {
+      throw std::invalid_argument("--calibration excludes --focal-length and --baseline");
+    }
+    return readCalibration(values["calibration"].as<std::string>());
+  }
+  if (has_focal_length != has_baseline) {
+    throw std::invalid_argument("--focal-length and --baseline need each other");
+  }
+  if (!has_focal_length) return std::nullopt;
+  const double f = values["focal-length"].as<double>(), baseline = values["baseline"].as<double>();
+  const double cx = 0.5 * (size.width - 1), cy = 0.5 * (size.height - 1);
+  Calibration calibration;
+  calibration.left = {f, 0, cx, 0, 0, f, cy, 0, 0, 0, 1, 0};
+  calibration.geometry = stereoGeometry(calibration.left, {f, 0, cx, -f * baseline, 0, f, cy, 0, 0, 0, 1, 0});
+  return calibration;
+}
+
+void writeImage(const std::string& file, const cv::Mat& image) {
+  bool is_written = false;
+  try {
+    is_written = cv::imwrite(file, image);
+  } catch (const cv::Exception&) {
+    // An ending that OpenCV does not know.
+  }
+  if (!is_written) throw std::runtime_error("cannot write " + file);
+}
+
+/// Unknown disparities are infinite there, as in Middlebury's files.
+void writePfm(const std::string& file, const cv::Mat& disparity, const DisparityRange& range) {
+  cv::Mat map = disparity.clone();
+  for (float& d : cv::Mat_<float>(map)) {
+    if (!range.isValid(d)) d = std::numeric_limits<float>::infinity();
+  }
+  writeImage(file, map);
+}
+
+void refinePair(const std::string& left_file, const std::string& right_file, StageParameters& parameters,
+                const po::variables_map& values, Outputs outputs) {
+  const cv::Mat left = readGrayImage(left_file), right = readGrayImage(right_file);
+  requireSizeOfLeftImage(right_file, right, left.size());
+  const std::optional<Calibration> calibration = calibrationOf(values, left.size());
+  requireArgument(outputs.color_max > parameters.matching().min_disparity, "color-max", outputs.color_max,
+                  "more than min_disparity");
+  if (!outputs.ply.empty() && !calibration) {
+    throw std::invalid_argument("--ply needs --calibration, or --focal-length and --baseline");
+  }
+  if (!outputs.any()) {
+    outputs.png = DEFAULT_PNG;
+    outputs.color = DEFAULT_COLOR;
+  }
+  if (!calibration) parameters.set("disparity_error", "0");
+  const StereoGeometry geometry = calibration ? calibration->geometry : StereoGeometry{1.0, 1.0, 0.0};
+
+  RefinementPicture result;
+  StereoMatcher matcher(parameters.matching());
+  matcher.compute(left, right, result.disparity, geometry.principal_point_offset);
+  const DisparityRange range = matcher.range(geometry.principal_point_offset);
+  const int segments = Segmentation().compute(left, parameters.segmentation(), result.labels);
+  PlaneRefinement().refine(result.disparity, result.labels, range, geometry.focal_length * geometry.baseline,
+                           parameters.refinement(), result.refined);
+  result.disparity_range = result.refined_range = range;
+
+  // Told when everything is written.
+  std::string text = std::to_string(segments) + " segments\n";
+  const auto tell = [&text](const std::string& file, const std::string& what) {
+    text += file + ": " + what + "\n";
+  };
+  if (!outputs.png.empty()) {
+    writeDisparityPng(outputs.png, result.refined, range);
+    tell(outputs.png, "disparity * 256, 0 where unknown");
+  }
+  if (!outputs.color.empty()) {
+    cv::Mat bgr;
+    colorizeDisparity(result.refined, range, range.min, outputs.color_max, bgr);
+    writeImage(outputs.color, bgr);
+    tell(outputs.color, "disparity in colours, black where unknown");
+  }
+  if (!outputs.pfm.empty()) {
+    writePfm(outputs.pfm, result.refined, range);
+    tell(outputs.pfm, "disparity [px], infinite where unknown");
+  }
+  if (!outputs.ply.empty()) {
+    const int points =
+        writePly(outputs.ply, result.refined, range, readColorImage(left_file), calibration->left, geometry);
+    tell(outputs.ply, std::to_string(points) + " points");
+  }
+  if (!outputs.picture.empty()) {
+    result.image = left;
+    result.scale_max = outputs.color_max;
+    writeImage(outputs.picture, drawRefinement(result));
+    tell(outputs.picture, "image, segments, disparity before and after");
+  }
+  std::cout << text;
+}
+
+void run(int argc, char** argv) {
+  Outputs outputs;
+  const auto file_value = [](std::string& file) { return po::value(&file)->value_name("FILE"); };
+  po::options_description description("Options");
+  description.add_options()("output,o", file_value(outputs.png), "refined disparity as KITTI's 16-bit PNG")(
+      "color", file_value(outputs.color), "refined disparity in colours")(
+      "pfm", file_value(outputs.pfm), "refined disparity as PFM")("ply", file_value(outputs.ply),
+                                                                  "point cloud as PLY")(
+      "picture", file_value(outputs.picture), "image, segments, disparity before and after in one picture")(
+      "color-max", po::value(&outputs.color_max)->default_value(outputs.color_max),
+      "disparity at the near end of the colour scale [px]")(
+      "calibration", po::value<std::string>()->value_name("FILE"),
+      "KITTI calibration file with P0 and P1, or P_rect_00 and P_rect_01")(
+      "focal-length", po::value<double>()->value_name("PX"),
+      "of both images [px], which are taken as centred")("baseline", po::value<double>()->value_name("M"),
+                                                         "distance of the cameras [m]");
+  po::options_description parameter_options("Parameters, as for the nodelets");
+  StageParameters::addOptions(parameter_options);
+  description.add(parameter_options);
+  po::variables_map values;
+  if (!parseCommandLine(argc, argv, USAGE, {"LEFT", "RIGHT"}, description, values)) return;
+  StageParameters parameters;
+  parameters.readOptions(values);
+  refinePair(values["LEFT"].as<std::string>(), values["RIGHT"].as<std::string>(), parameters, values,
+             outputs);
+}
+
+}  // namespace
+}  // namespace disparity_refinement
+
+int main(int argc, char** argv) {
+  return disparity_refinement::runTool("refine", [&] { disparity_refinement::run(argc, argv); });
+}

@@ -1,0 +1,140 @@
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <string>
+
+#include "KittiFixture.hpp"
+#include "StageParameters.hpp"
+
+namespace disparity_refinement {
+namespace {
+
+/// What the exception says, empty without one.
+template <class Step>
+std::string refusal(const Step& step) {
+  try {
+    step();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(StageParameters, startsWithTheDefaultsOfTheCore) {
+  const StageParameters parameters;
+  EXPECT_EQ(parameters.matching().correlation_window_size, MatchingParameters().correlation_window_size);
+  EXPECT_EQ(parameters.segmentation().lambda, SegmentationParameters().lambda);
+  EXPECT_EQ(parameters.refinement().max_divergence, PlaneRefinementParameters().max_divergence);
+}
+
+TEST(StageParameters, setsEachTypeByItsName) {
+  StageParameters parameters;
+  parameters.set("full_width", "true");
+  parameters.set("min_disparity", "-16");
+  parameters.set("h", "7");
+  parameters.set("inlier_threshold", "2");
+  parameters.set("shadow_gamma", "0.5");
+  EXPECT_TRUE(parameters.matching().full_width);
+  EXPECT_EQ(parameters.matching().min_disparity, -16);
+  EXPECT_EQ(parameters.segmentation().h, 7);
+  EXPECT_EQ(parameters.refinement().inlier_threshold, 2.0);
+  EXPECT_EQ(parameters.segmentation().gradient.shadow_gamma, 0.5);
+  EXPECT_EQ(std::get<int>(parameters.values().at("h")), 7);
+  EXPECT_EQ(parameters.values().size(),
+            parameters.matchingValues().size() + 7 /* segmentation */ + 12 /* refinement */);
+}
+
+TEST(StageParameters, refusesWhatANodeletWouldReplace) {
+  StageParameters parameters;
+  EXPECT_EQ(refusal([&] { parameters.set("lambda", "-1"); }),
+            "lambda is -1, expected an integer in 0 ... 1000000");
+  EXPECT_EQ(refusal([&] { parameters.set("h", "2.5"); }), "h is 2.5, expected an integer in 0 ... 255");
+  EXPECT_EQ(refusal([&] { parameters.set("confidence", "nan"); }),
+            "confidence is nan, expected a number in 0.5 ... 0.9999");
+  EXPECT_EQ(refusal([&] { parameters.set("confidence", ".nan"); }),
+            "confidence is .nan, expected a number in 0.5 ... 0.9999");
+  EXPECT_EQ(refusal([&] { parameters.set("full_width", "2"); }), "full_width is 2, expected true or false");
+  EXPECT_NE(refusal([&] { parameters.set("h", "["); }).find("h is "), std::string::npos);
+  EXPECT_NE(refusal([&] { parameters.set("h", ""); }).find("h is "), std::string::npos);
+  EXPECT_EQ(refusal([&] { parameters.set("lamda", "5"); }),
+            "lamda is no parameter of disparity, segmentation or plane_refinement");
+  EXPECT_EQ(parameters.segmentation().lambda, SegmentationParameters().lambda) << "nothing was changed";
+
+  parameters.set("correlation_window_size", "4");
+  EXPECT_EQ(refusal([&] { parameters.matching(); }),
+            "correlation_window_size is 4, the nearest allowed value is 5");
+}
+
+TEST(StageParameters, theWindowMayBeSetBeforeTheAlgorithm) {
+  StageParameters parameters;
+  parameters.set("correlation_window_size", "21");
+  EXPECT_NE(refusal([&] { parameters.matching(); }), "") << "too large for SGBM";
+  parameters.set("stereo_algorithm", "0");
+  EXPECT_EQ(parameters.matching().correlation_window_size, 21);
+}
+
+TEST(StageParameters, readsTheFileOfTheLaunchFiles) {
+  const TemporaryFolder folder;
+  const std::string file = (folder / "parameters.yaml").string();
+  writeText(
+      file,
+      "disparity: {sgbm_mode: 1, queue_size: 3}\nsegmentation:\n  lambda: 80\n  shadow_enhancement: off\n"
+      "plane_refinement: {max_divergence: 5}\nvisualization: {color_max_disparity: 32.0}\n");
+  StageParameters parameters;
+  EXPECT_EQ(parameters.load(file), (std::vector<std::string>{"disparity/queue_size", "visualization"}));
+  EXPECT_EQ(parameters.matching().sgbm_mode, SgbmMode::HH);
+  EXPECT_EQ(parameters.segmentation().lambda, 80);
+  EXPECT_FALSE(parameters.segmentation().gradient.shadow_enhancement);
+  EXPECT_EQ(parameters.refinement().max_divergence, 5.0);
+}
+
+TEST(StageParameters, namesTheFileThatItCannotRead) {
+  const TemporaryFolder folder;
+  const std::string file = (folder / "parameters.yaml").string();
+  StageParameters parameters;
+  const auto load = [&](const std::string& text) {
+    writeText(file, text);
+    return refusal([&] { parameters.load(file); });
+  };
+  EXPECT_NE(refusal([&] { parameters.load(file); }).find(file), std::string::npos) << "no such file";
+  for (const std::string text : {"segmentation: {lambda: -1}", "segmentation: 5", "- 1\n- 2", "a: [", "text",
+                                 "segmentation: {lambda: [1, 2]}", "segmentation: {? [1]: 2}"}) {
+    EXPECT_EQ(load(text).find(file), 0U) << text;
+  }
+  EXPECT_EQ(load(""), "") << "an empty file sets nothing";
+}
+
+TEST(StageParameters, optionsWinOverTheFile) {
+  const TemporaryFolder folder;
+  const std::string file = (folder / "parameters.yaml").string();
+  writeText(file, "segmentation: {lambda: 80, h: 15}\n");
+  namespace po = boost::program_options;
+  po::options_description description;
+  StageParameters::addOptions(description);
+  const char* arguments[] = {"tool", "--params",      file.c_str(), "--h", "3", "--min_disparity",
+                             "-16",  "--max_slope_x", "0.5"};
+  po::variables_map values;
+  po::store(po::parse_command_line(9, arguments, description), values);
+  StageParameters parameters;
+  parameters.readOptions(values);
+  EXPECT_EQ(parameters.segmentation().lambda, 80);
+  EXPECT_EQ(parameters.segmentation().h, 3);
+  EXPECT_EQ(parameters.matching().min_disparity, -16);
+  EXPECT_EQ(parameters.refinement().max_slope_x, 0.5);
+}
+
+TEST(StageParameters, tellsWhichStageDiffers) {
+  StageParameters a, b;
+  EXPECT_TRUE(a.hasSameMatching(b));
+  b.set("lambda", "5");
+  b.set("max_divergence", "1");
+  EXPECT_TRUE(a.hasSameMatching(b));
+  EXPECT_FALSE(a.hasSameSegmentation(b));
+  a.set("lambda", "5");
+  EXPECT_TRUE(a.hasSameSegmentation(b));
+  a.set("P1", "10");
+  EXPECT_FALSE(a.hasSameMatching(b));
+}
+
+}  // namespace
+}  // namespace disparity_refinement
