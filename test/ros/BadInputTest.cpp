@@ -22,8 +22,8 @@ using rosgraph_msgs::Log;
 using sensor_msgs::Image;
 using stereo_msgs::DisparityImage;
 
-const float kNan = std::numeric_limits<float>::quiet_NaN();
-const float kInfinity = std::numeric_limits<float>::infinity();
+const float NOT_A_NUMBER = std::numeric_limits<float>::quiet_NaN();
+const float INFINITE = std::numeric_limits<float>::infinity();
 
 int countValid(const DisparityImage& message) {
   return cv::countNonZero(imageView(message.image, enc::TYPE_32FC1, "disparity") >= message.min_disparity);
@@ -176,16 +176,16 @@ TEST_F(BadPair, isReportedOnceForManyFrames) {
   const long before = waitForErrors(0);
   ASSERT_GE(before, 0);
 
-  constexpr int kFrames = 4;  // fewer than a queue holds
+  constexpr int FRAMES = 4;  // fewer than a queue holds
   const ros::WallTime begin = ros::WallTime::now();
-  for (int i = 0; i < kFrames; ++i) {
+  for (int i = 0; i < FRAMES; ++i) {
     StereoMessages messages = next();
     messages.left->encoding = "again and again";
     rig_->camera.publish(messages);
   }
   expectGoodFrame();
   diagnostics.clear();
-  EXPECT_GE(waitForErrors(before + kFrames), before + kFrames);
+  EXPECT_GE(waitForErrors(before + FRAMES), before + FRAMES);
 
   std::set<const Log*> lines;
   rig_->log.messages().wait(
@@ -200,7 +200,7 @@ TEST_F(BadPair, isReportedOnceForManyFrames) {
   const double seconds = (ros::WallTime::now() - begin).toSec();
   EXPECT_GE(lines.size(), 1U);
   EXPECT_LE(lines.size(), 1U + static_cast<std::size_t>(seconds / 5.0));
-  EXPECT_LT(lines.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_LT(lines.size(), static_cast<std::size_t>(FRAMES));
 }
 
 TEST_F(BadPair, withDifferentFramesIsProcessedInTheLeftOne) {
@@ -270,7 +270,7 @@ TEST_F(BadPair, inAnotherEncodingIsGood) {
 /// Disparity maps and labels of another publisher, for a refiner alone.
 class ForeignDisparity : public testing::Test {
  protected:
-  static constexpr int kWidth = 64, kHeight = 48;
+  static constexpr int WIDTH = 64, HEIGHT = 48;
 
   struct Frame {
     stereo_msgs::DisparityImagePtr disparity;
@@ -306,15 +306,15 @@ class ForeignDisparity : public testing::Test {
     geometry.baseline = 0.5;
     DisparityRange range;
     range.max = 64.0F;
-    const cv::Size size(kWidth, kHeight);
+    const cv::Size size(WIDTH, HEIGHT);
     Frame frame;
     frame.disparity = makeDisparityImage(header, size, geometry, range, {8, 2, 48, 44});
     frame.labels = makeImage(header, size, enc::TYPE_32SC1);
     cv::Mat map = frame.map(), segments = frame.segments();
-    for (int y = 0; y < kHeight; ++y) {
-      for (int x = 0; x < kWidth; ++x) {
+    for (int y = 0; y < HEIGHT; ++y) {
+      for (int x = 0; x < WIDTH; ++x) {
         map.at<float>(y, x) = plane(x, y);
-        segments.at<int>(y, x) = x < kWidth / 2 ? 0 : 1;
+        segments.at<int>(y, x) = x < WIDTH / 2 ? 0 : 1;
       }
     }
     map(hole()) = range.invalid();
@@ -338,8 +338,8 @@ class ForeignDisparity : public testing::Test {
   static void expectPlane(const DisparityImage& message) {
     expectContract(message);
     const cv::Mat map = imageView(message.image, enc::TYPE_32FC1, "disparity_refined");
-    for (int y = 0; y < kHeight; ++y) {
-      for (int x = 0; x < kWidth; ++x) {
+    for (int y = 0; y < HEIGHT; ++y) {
+      for (int x = 0; x < WIDTH; ++x) {
         if (x > 0 || y > 0) {
           ASSERT_NEAR(map.at<float>(y, x), plane(x, y), 1e-3) << x << ", " << y;
         }
@@ -398,13 +398,13 @@ TEST_F(ForeignDisparity, keepsHeaderGeometryAndWindow) {
 }
 
 TEST_F(ForeignDisparity, takesAnythingBelowMinAndNotFiniteForInvalid) {
-  for (const float bad : {kNan, kInfinity, -kInfinity, -10.0F, -0.5F}) {
+  for (const float bad : {NOT_A_NUMBER, INFINITE, -INFINITE, -10.0F, -0.5F}) {
     SCOPED_TRACE(bad);
     expectRepair([bad](Frame& frame) {
       cv::Mat map = frame.map();
       map(hole()) = cv::Scalar(bad);
       map.at<float>(0, 0) = bad;
-      map.at<float>(kHeight - 1, kWidth - 1) = bad;
+      map.at<float>(HEIGHT - 1, WIDTH - 1) = bad;
     });
   }
   // Zero is invalid for some publishers: they say so by their min_disparity.
@@ -417,7 +417,7 @@ TEST_F(ForeignDisparity, takesAnythingBelowMinAndNotFiniteForInvalid) {
 }
 
 TEST_F(ForeignDisparity, withoutAnyDisparityStaysEmpty) {
-  for (const float bad : {kNan, -1.0F}) {
+  for (const float bad : {NOT_A_NUMBER, -1.0F}) {
     Frame frame = next();
     frame.map() = cv::Scalar(bad);
     const auto message = process(frame);
@@ -428,7 +428,7 @@ TEST_F(ForeignDisparity, withoutAnyDisparityStaysEmpty) {
 }
 
 TEST_F(ForeignDisparity, hasItsStepBetweenDisparitiesRepaired) {
-  for (const float delta : {0.0F, -1.0F, kNan}) {
+  for (const float delta : {0.0F, -1.0F, NOT_A_NUMBER}) {
     const auto message = expectRepair([delta](Frame& frame) { frame.disparity->delta_d = delta; });
     ASSERT_TRUE(message);
     EXPECT_EQ(message->delta_d, 0.0625F) << delta;
@@ -437,7 +437,7 @@ TEST_F(ForeignDisparity, hasItsStepBetweenDisparitiesRepaired) {
 
 TEST_F(ForeignDisparity, hasItsMaximumRaised) {
   // The largest disparity is 20.8125.
-  for (const float max : {0.0F, -1.0F, 20.0F, kNan, kInfinity}) {
+  for (const float max : {0.0F, -1.0F, 20.0F, NOT_A_NUMBER, INFINITE}) {
     const auto message = expectRepair([max](Frame& frame) { frame.disparity->max_disparity = max; });
     ASSERT_TRUE(message);
     EXPECT_EQ(message->max_disparity, 21.0F) << max;
@@ -451,15 +451,15 @@ TEST_F(ForeignDisparity, hasItsWindowRepaired) {
       [=](sensor_msgs::RegionOfInterest& window) { window.x_offset = wrapped; },
       [=](sensor_msgs::RegionOfInterest& window) { window.x_offset = window.width = wrapped; },
       [=](sensor_msgs::RegionOfInterest& window) { window.height = wrapped; },
-      [](sensor_msgs::RegionOfInterest& window) { window.y_offset = kHeight; },
+      [](sensor_msgs::RegionOfInterest& window) { window.y_offset = HEIGHT; },
       [](sensor_msgs::RegionOfInterest& window) { window = sensor_msgs::RegionOfInterest(); }};
   for (const auto& spoil : bad_windows) {
     const auto message = expectRepair([&spoil](Frame& frame) { spoil(frame.disparity->valid_window); });
     ASSERT_TRUE(message);
     EXPECT_EQ(message->valid_window.x_offset, 0U);
     EXPECT_EQ(message->valid_window.y_offset, 0U);
-    EXPECT_EQ(message->valid_window.width, std::uint32_t{kWidth});
-    EXPECT_EQ(message->valid_window.height, std::uint32_t{kHeight});
+    EXPECT_EQ(message->valid_window.width, std::uint32_t{WIDTH});
+    EXPECT_EQ(message->valid_window.height, std::uint32_t{HEIGHT});
   }
 }
 
@@ -479,11 +479,11 @@ TEST_F(ForeignDisparity, ofAnotherLayoutIsAnError) {
   const std::string topic = "/foreign/disparity: ";
   expectError([](Frame& frame) { frame.disparity->image.encoding = enc::TYPE_16UC1; },
               {topic, "encoding is '16UC1', expected 32FC1"});
-  expectError([](Frame& frame) { frame.disparity->image.step = 4 * kWidth - 4; }, {topic, "step is 252"});
+  expectError([](Frame& frame) { frame.disparity->image.step = 4 * WIDTH - 4; }, {topic, "step is 252"});
   expectError(
       [](Frame& frame) {
         frame.disparity->image.step += 2;
-        frame.disparity->image.data.resize(frame.disparity->image.step * kHeight);
+        frame.disparity->image.data.resize(frame.disparity->image.step * HEIGHT);
       },
       {topic, "step is 258", "a multiple of 4"});
   expectError([](Frame& frame) { frame.disparity->image.step += 4; }, {topic, "12288 bytes, expected 12480"});
@@ -496,11 +496,12 @@ TEST_F(ForeignDisparity, withoutGeometryIsAnError) {
   const std::string topic = "/foreign/disparity: ";
   expectError([](Frame& frame) { frame.disparity->f = 0.0F; }, {topic, "f is 0 px"});
   expectError([](Frame& frame) { frame.disparity->f = -200.0F; }, {topic, "f is -200 px"});
-  expectError([](Frame& frame) { frame.disparity->f = kNan; }, {topic, "f is nan px"});
-  expectError([](Frame& frame) { frame.disparity->f = kInfinity; }, {"/foreign/disparity", "is inf"});
+  expectError([](Frame& frame) { frame.disparity->f = NOT_A_NUMBER; }, {topic, "f is nan px"});
+  expectError([](Frame& frame) { frame.disparity->f = INFINITE; }, {"/foreign/disparity", "is inf"});
   expectError([](Frame& frame) { frame.disparity->T = 0.0F; }, {topic, "T is 0 m"});
   expectError([](Frame& frame) { frame.disparity->T = -0.5F; }, {topic, "T is -0.5 m"});
-  expectError([](Frame& frame) { frame.disparity->min_disparity = kNan; }, {topic, "min_disparity is nan"});
+  expectError([](Frame& frame) { frame.disparity->min_disparity = NOT_A_NUMBER; },
+              {topic, "min_disparity is nan"});
 }
 
 TEST_F(ForeignDisparity, withBadLabelsIsAnError) {
@@ -509,11 +510,11 @@ TEST_F(ForeignDisparity, withBadLabelsIsAnError) {
               {topic, "encoding is 'mono8', expected 32SC1"});
   expectError(
       [](Frame& frame) {
-        frame.labels = makeImage(frame.disparity->header, {kWidth, kHeight - 1}, enc::TYPE_32SC1);
+        frame.labels = makeImage(frame.disparity->header, {WIDTH, HEIGHT - 1}, enc::TYPE_32SC1);
       },
       {topic, "64x47", "64x48"});
   expectError([](Frame& frame) { frame.labels->data.pop_back(); }, {topic, "12287 bytes, expected 12288"});
-  expectError([](Frame& frame) { frame.segments().at<int>(5, 7) = kWidth * kHeight; }, {topic, "3072"});
+  expectError([](Frame& frame) { frame.segments().at<int>(5, 7) = WIDTH * HEIGHT; }, {topic, "3072"});
   expectError([](Frame& frame) { frame.segments().at<int>(5, 7) = std::numeric_limits<int>::max(); },
               {topic, "2147483647"});
 }
@@ -521,7 +522,7 @@ TEST_F(ForeignDisparity, withBadLabelsIsAnError) {
 TEST_F(ForeignDisparity, withGapsInTheLabelsIsGood) {
   expectRepair([](Frame& frame) {
     cv::Mat segments = frame.segments();
-    segments.setTo(kWidth * kHeight - 1, segments == 1);
+    segments.setTo(WIDTH * HEIGHT - 1, segments == 1);
   });
 }
 
@@ -533,9 +534,9 @@ TEST_F(ForeignDisparity, keepsWhatIsInNoSegment) {
   ASSERT_TRUE(message);
   expectContract(*message);
   const cv::Mat map = imageView(message->image, enc::TYPE_32FC1, "disparity_refined");
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      const bool is_hole = hole().contains({x, y}) && x >= kWidth / 2;
+  for (int y = 0; y < HEIGHT; ++y) {
+    for (int x = 0; x < WIDTH; ++x) {
+      const bool is_hole = hole().contains({x, y}) && x >= WIDTH / 2;
       ASSERT_NEAR(map.at<float>(y, x), is_hole ? -1.0F : plane(x, y), 1e-3) << x << ", " << y;
     }
   }

@@ -16,8 +16,8 @@ namespace {
 
 namespace enc = sensor_msgs::image_encodings;
 
-const float kNan = std::numeric_limits<float>::quiet_NaN();
-const float kInfinity = std::numeric_limits<float>::infinity();
+const float NOT_A_NUMBER = std::numeric_limits<float>::quiet_NaN();
+const float INFINITE = std::numeric_limits<float>::infinity();
 
 sensor_msgs::ImagePtr image(const std::string& encoding, const cv::Mat& pixels) {
   return cv_bridge::CvImage(std_msgs::Header(), encoding, pixels).toImageMsg();
@@ -229,11 +229,11 @@ TEST(DisparityRangeOfMessage, raisesAMaximumThatIsTooSmall) {
   // As stereo_image_proc: max_disparity is min + range - 1, the map reaches 15/16 above it.
   map.at<float>(1, 2) = 10.9375F;
   EXPECT_EQ(disparityRange(*message, "disparity").max, 11.0F);
-  for (const float max : {0.0F, -1.0F, 2.0F, 10.5F, kNan}) {
+  for (const float max : {0.0F, -1.0F, 2.0F, 10.5F, NOT_A_NUMBER}) {
     message->max_disparity = max;
     EXPECT_EQ(disparityRange(*message, "disparity").max, 11.0F) << max;
   }
-  message->max_disparity = kInfinity;
+  message->max_disparity = INFINITE;
   EXPECT_EQ(disparityRange(*message, "disparity").max, 11.0F);
   message->max_disparity = 10.9375F;
   EXPECT_EQ(disparityRange(*message, "disparity").max, 10.9375F);
@@ -242,9 +242,9 @@ TEST(DisparityRangeOfMessage, raisesAMaximumThatIsTooSmall) {
 TEST(DisparityRangeOfMessage, ignoresWhatIsNoDisparity) {
   const auto message = disparityImage();
   cv::Mat map = imageView(message->image, enc::TYPE_32FC1, "disparity");
-  map.at<float>(0, 0) = kNan;
-  map.at<float>(0, 1) = kInfinity;
-  map.at<float>(0, 2) = -kInfinity;
+  map.at<float>(0, 0) = NOT_A_NUMBER;
+  map.at<float>(0, 1) = INFINITE;
+  map.at<float>(0, 2) = -INFINITE;
   map.at<float>(1, 0) = 1.0F;
   EXPECT_EQ(disparityRange(*message, "disparity").max, 10.0F);
   message->max_disparity = 0.0F;
@@ -254,14 +254,14 @@ TEST(DisparityRangeOfMessage, ignoresWhatIsNoDisparity) {
 TEST(DisparityRangeOfMessage, isNotEmptyForAMapWithoutDisparity) {
   const auto message = disparityImage();
   cv::Mat map = imageView(message->image, enc::TYPE_32FC1, "disparity");
-  map = kNan;
+  map = NOT_A_NUMBER;
   message->max_disparity = 0.0F;
   EXPECT_EQ(disparityRange(*message, "disparity").max, 3.0F);
 }
 
 TEST(DisparityRangeOfMessage, refusesAMinimumThatIsNotFinite) {
   const auto message = disparityImage();
-  for (const float min : {kNan, kInfinity, -kInfinity}) {
+  for (const float min : {NOT_A_NUMBER, INFINITE, -INFINITE}) {
     message->min_disparity = min;
     EXPECT_REFUSED(disparityRange(*message, "disparity"), "disparity: ", "min_disparity");
   }
@@ -271,7 +271,7 @@ TEST(DisparityGeometry, refusesWhatIsNotPositive) {
   const auto message = disparityImage();
   EXPECT_EQ(disparityGeometry(*message, "disparity").focal_length, 400.0);
   EXPECT_EQ(disparityGeometry(*message, "disparity").baseline, 0.5);
-  for (const float bad : {0.0F, -1.0F, kNan}) {
+  for (const float bad : {0.0F, -1.0F, NOT_A_NUMBER}) {
     message->f = bad;
     EXPECT_REFUSED(disparityGeometry(*message, "disparity"), "disparity: ", "f is ");
     message->f = 400.0F;
@@ -291,7 +291,7 @@ TEST(DepthImage, isFTimesTOverD) {
   header.stamp = ros::Time(12, 34);
   header.frame_id = "stereo_left";
   // Invalid, behind infinity, infinitely far, 1 px, 40 px, NaN.
-  const cv::Mat disparity = (cv::Mat_<float>(2, 3) << -3.0F, -1.0F, 0.0F, 1.0F, 40.0F, kNan);
+  const cv::Mat disparity = (cv::Mat_<float>(2, 3) << -3.0F, -1.0F, 0.0F, 1.0F, 40.0F, NOT_A_NUMBER);
   const auto message = depthImage(header, disparity, range, geometry);
   EXPECT_EQ(message->header.stamp, header.stamp);
   EXPECT_EQ(message->header.frame_id, header.frame_id);

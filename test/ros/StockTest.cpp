@@ -114,7 +114,7 @@ TEST(Downstream, stockPointCloudKeepsTheFarthestSurfaceOfAMapWithoutHoles) {
   Listener<PointCloud2> cloud(nh, "points2");
 
   // A wall at 25 m behind one at 5 m: f * T = 100 px m.
-  constexpr float kFar = 4.0F, kNear = 20.0F;
+  constexpr float FAR = 4.0F, NEAR = 20.0F;
   const StreetFrame frame = camera.street().render(0);
   const cv::Size size = frame.left.size();
   const cv::Rect wall(100, 30, 80, 60);
@@ -129,8 +129,8 @@ TEST(Downstream, stockPointCloudKeepsTheFarthestSurfaceOfAMapWithoutHoles) {
         makeDisparityImage(messages.left->header, size, geometry, range, cv::Rect(cv::Point(), size));
     const auto segments = makeImage(messages.left->header, size, enc::TYPE_32SC1);
     cv::Mat d = imageView(map->image, enc::TYPE_32FC1, "disparity");
-    d = kFar;
-    d(wall) = kNear;
+    d = FAR;
+    d(wall) = NEAR;
     imageView(*segments, enc::TYPE_32SC1, "labels")(wall) = 1;
     camera.publish(messages);
     disparity.publish(map);
@@ -148,8 +148,8 @@ TEST(Downstream, stockPointCloudKeepsTheFarthestSurfaceOfAMapWithoutHoles) {
   const auto cloud_message = cloud.wait(StereoCamera::stamp(index));
   ASSERT_TRUE(refined_message && cloud_message);
   const cv::Mat map = imageView(refined_message->image, enc::TYPE_32FC1, "disparity_refined");
-  EXPECT_EQ(cv::countNonZero(map == kFar), size.area() - wall.area() - 1);
-  EXPECT_EQ(cv::countNonZero(map == kNear), wall.area());
+  EXPECT_EQ(cv::countNonZero(map == FAR), size.area() - wall.area() - 1);
+  EXPECT_EQ(cv::countNonZero(map == NEAR), wall.area());
   expectCloud(*cloud_message, *refined_message);
 }
 

@@ -173,16 +173,16 @@ TEST(ApproximateSync, rejectsPairsThatAreTooFarApart) {
 /// Plays frames in a loop, as `rosbag play --loop` does, a few of them on their way at any time. Every loop
 /// ends with left images that have no partner: without care they fill the queues against what is earlier.
 void expectAllOfEveryLoop(Chain& chain, int frames, double right_offset) {
-  constexpr int kLoops = 3, kUnderWay = 2, kUnpaired = 10;
+  constexpr int LOOPS = 3, UNDER_WAY = 2, UNPAIRED = 10;
   ros::Publisher left = chain.nh.advertise<Image>("left/image_rect", 100);
   ASSERT_TRUE(chain.connect());
   ASSERT_TRUE(chain.refined.wait(chain.publish(-1, right_offset)));
-  for (int loop = 0; loop < kLoops; ++loop) {
+  for (int loop = 0; loop < LOOPS; ++loop) {
     for (auto* listener : {&chain.raw, &chain.refined}) listener->clear();
     for (int i = 0; i < frames; ++i) {
       chain.publish(i, right_offset);
-      if (i >= kUnderWay) {
-        ASSERT_TRUE(chain.refined.wait(StereoCamera::stamp(i - kUnderWay))) << "loop " << loop << ", " << i;
+      if (i >= UNDER_WAY) {
+        ASSERT_TRUE(chain.refined.wait(StereoCamera::stamp(i - UNDER_WAY))) << "loop " << loop << ", " << i;
       }
     }
     ASSERT_TRUE(chain.refined.wait(StereoCamera::stamp(frames - 1))) << "the end of loop " << loop;
@@ -191,7 +191,7 @@ void expectAllOfEveryLoop(Chain& chain, int frames, double right_offset) {
       EXPECT_TRUE(chain.refined.wait(StereoCamera::stamp(i), 0.0)) << "loop " << loop << ", " << i;
     }
     EXPECT_EQ(chain.refined.count(), static_cast<std::size_t>(frames)) << "loop " << loop;
-    for (int i = 0; i < kUnpaired; ++i) left.publish(chain.make(frames + i).left);
+    for (int i = 0; i < UNPAIRED; ++i) left.publish(chain.make(frames + i).left);
   }
 }
 
@@ -217,7 +217,7 @@ TEST(ExactSync, playsASinglePairAgainAndAgain) {
 }
 
 TEST(Overload, dropsAndCountsTheOldestFrames) {
-  constexpr int kFrames = 10;
+  constexpr int FRAMES = 10;
   StreetParameters street;  // 640x240
   Chain chain("slow", street);
   Diagnostics diagnostics(chain.nh, "slow/disparity");
@@ -229,17 +229,17 @@ TEST(Overload, dropsAndCountsTheOldestFrames) {
   for (auto* listener : {&chain.raw, &chain.refined}) listener->clear();
   chain.labels.clear();
   std::vector<StereoMessages> burst;
-  for (int i = 0; i < kFrames; ++i) burst.push_back(chain.make(i));
+  for (int i = 0; i < FRAMES; ++i) burst.push_back(chain.make(i));
   for (const StereoMessages& messages : burst) {
     chain.camera.publish(messages);
     // Far less than the matcher takes, enough for the messages to arrive one after the other.
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-  const ros::Time newest = StereoCamera::stamp(kFrames - 1);
+  const ros::Time newest = StereoCamera::stamp(FRAMES - 1);
   EXPECT_TRUE(chain.raw.wait(newest));
   EXPECT_TRUE(chain.labels.wait(newest));
   EXPECT_TRUE(chain.refined.wait(newest)) << "disparity and labels of the newest frame are joined";
-  EXPECT_LT(chain.raw.count(), static_cast<std::size_t>(kFrames));
+  EXPECT_LT(chain.raw.count(), static_cast<std::size_t>(FRAMES));
 
   // Nothing is under way any more: every frame that was received is published or counted as dropped.
   const DiagnosticStatus after = diagnostics.next();
