@@ -84,9 +84,7 @@ std::vector<EvaluatedMethod> makeMethods(const StageParameters& base, std::vecto
       EvaluatedMethod matcher = method;
       matcher.is_refined = false;
       matcher.name = matcherName(method.parameters.matching());
-      // The same matcher with other parameters.
-      const auto has_name = [&](const EvaluatedMethod& other) { return other.name == matcher.name; };
-      if (std::any_of(methods.begin(), methods.end(), has_name)) matcher.name += ", " + variant;
+      if (!base.hasSameMatching(method.parameters)) matcher.name += ", " + variant;
       methods.push_back(matcher);
     }
     method.name = refinedName(method.parameters, variant);
