@@ -117,13 +117,14 @@ struct StereoMessages {
   sensor_msgs::CameraInfoPtr left_info, right_info;
 };
 
-/// A rectified stereo camera on the synthetic street.
+/// A rectified stereo camera on the synthetic street. `image` is the name of its images.
 class StereoCamera {
  public:
-  explicit StereoCamera(ros::NodeHandle& nh, const StreetParameters& parameters = smallStreet())
+  explicit StereoCamera(ros::NodeHandle& nh, const StreetParameters& parameters = smallStreet(),
+                        const std::string& image = "image_rect")
       : street_(parameters) {
-    left_ = nh.advertise<sensor_msgs::Image>("left/image_rect", 100);
-    right_ = nh.advertise<sensor_msgs::Image>("right/image_rect", 100);
+    left_ = nh.advertise<sensor_msgs::Image>("left/" + image, 100);
+    right_ = nh.advertise<sensor_msgs::Image>("right/" + image, 100);
     left_info_ = nh.advertise<sensor_msgs::CameraInfo>("left/camera_info", 100);
     right_info_ = nh.advertise<sensor_msgs::CameraInfo>("right/camera_info", 100);
   }

@@ -6,14 +6,11 @@
 #include <stereo_msgs/DisparityImage.h>
 
 #include <cmath>
-#include <cstring>
 
 #include "ChainClient.hpp"
+#include "CoreChain.hpp"
 #include "DisparityContract.hpp"
 #include "disparity_refinement/Planes.h"
-#include "disparity_refinement/matching/StereoMatcher.hpp"
-#include "disparity_refinement/refinement/PlaneRefinement.hpp"
-#include "disparity_refinement/segmentation/Segmentation.hpp"
 
 namespace disparity_refinement {
 namespace {
@@ -21,47 +18,14 @@ namespace {
 using sensor_msgs::Image;
 using stereo_msgs::DisparityImage;
 
-/// The same pair through the core, with the parameters of chain.test.
-struct CoreResult {
-  DisparityRange range;
-  cv::Mat disparity, labels, refined;
-  int segments = 0;
-  std::vector<SegmentPlane> planes;
-};
-
-CoreResult runCore(const StereoMessages& messages, const SegmentationParameters& segmentation_parameters) {
-  const cv::Mat left = imageView(*messages.left, "mono8", "left");
-  const cv::Mat right = imageView(*messages.right, "mono8", "right");
-  MatchingParameters matching_parameters;
-  matching_parameters.disparity_range = 64;
-  PlaneRefinementParameters refinement_parameters;
-  refinement_parameters.min_valid_fraction = 0.3;
-
-  CoreResult result;
-  StereoMatcher matcher(matching_parameters);
-  matcher.compute(left, right, result.disparity);
-  result.range = matcher.range();
-  Segmentation segmentation;
-  result.segments = segmentation.compute(left, segmentation_parameters, result.labels);
-  PlaneRefinement refinement;
-  const double f_times_t = static_cast<double>(static_cast<float>(messages.left_info->P[0])) *
-                           static_cast<float>(-messages.right_info->P[3] / messages.left_info->P[0]);
-  refinement.refine(result.disparity, result.labels, result.range, f_times_t, refinement_parameters,
-                    result.refined);
-  result.planes = refinement.planes();
-  return result;
-}
-
-SegmentationParameters testSegmentation() {
-  SegmentationParameters parameters;
-  parameters.lambda = 20;
-  parameters.h = 3;
+/// The parameters of chain.test.
+CoreParameters testParameters() {
+  CoreParameters parameters;
+  parameters.matching.disparity_range = 64;
+  parameters.segmentation.lambda = 20;
+  parameters.segmentation.h = 3;
+  parameters.refinement.min_valid_fraction = 0.3;
   return parameters;
-}
-
-bool sameBits(const cv::Mat& a, const cv::Mat& b) {
-  return a.size() == b.size() && a.type() == b.type() && a.isContinuous() && b.isContinuous() &&
-         std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
 }
 
 class Chain : public testing::Test {
@@ -94,7 +58,7 @@ TEST_F(Chain, givesTheBitsOfTheCore) {
     const auto labels_message = labels.wait(camera_.stamp(i));
     const auto refined_message = refined.wait(camera_.stamp(i));
     ASSERT_TRUE(raw_message && labels_message && refined_message) << "frame " << i;
-    const CoreResult core = runCore(messages, testSegmentation());
+    const CoreResult core = runCore(messages, testParameters());
     EXPECT_TRUE(sameBits(imageView(raw_message->image, "32FC1", "disparity"), core.disparity))
         << "frame " << i;
     EXPECT_TRUE(sameBits(imageView(*labels_message, "32SC1", "labels"), core.labels)) << "frame " << i;
@@ -187,9 +151,9 @@ TEST_F(Chain, lambdaAndHAreLiveFromTheNextFrameOn) {
     camera_.publish(messages);
     const auto message = labels.wait(camera_.stamp(index++));
     ASSERT_TRUE(message);
-    SegmentationParameters parameters;
-    parameters.lambda = lambda;
-    parameters.h = h;
+    CoreParameters parameters = testParameters();
+    parameters.segmentation.lambda = lambda;
+    parameters.segmentation.h = h;
     const CoreResult core = runCore(messages, parameters);
     EXPECT_TRUE(sameBits(imageView(*message, "32SC1", "labels"), core.labels)) << lambda << ", " << h;
 
@@ -214,7 +178,7 @@ TEST_F(Chain, publishesThePlanesOfTheCore) {
   camera_.publish(messages);
   const auto message = planes.wait(camera_.stamp(0));
   ASSERT_TRUE(message);
-  const CoreResult core = runCore(messages, testSegmentation());
+  const CoreResult core = runCore(messages, testParameters());
   EXPECT_EQ(message->header.frame_id, "stereo_left");
   ASSERT_EQ(message->planes.size(), static_cast<std::size_t>(core.segments));
   int accepted = 0;
@@ -238,7 +202,7 @@ TEST_F(Chain, publishesDepthInMetres) {
   camera_.publish(messages);
   const auto message = depth.wait(camera_.stamp(0));
   ASSERT_TRUE(message);
-  const CoreResult core = runCore(messages, testSegmentation());
+  const CoreResult core = runCore(messages, testParameters());
   const cv::Mat z = imageView(*message, "32FC1", "depth");
   const StreetParameters& street = camera_.street().parameters();
   for (int y = 0; y < z.rows; ++y) {
