@@ -6,6 +6,8 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <iterator>
 #include <locale>
 #include <set>
 #include <sstream>
@@ -188,13 +190,18 @@ struct BenchmarkFiles {
   CameraNames camera;
 
   KittiFrame open(const std::string& name) const {
-    KittiFrame frame;
-    frame.name = fs::path(name).stem().string();
+    KittiFrame frame = openGroundTruth(name);
     frame.left = image(camera.left, name, "left");
     frame.right = image(camera.right, name, "right");
     const std::string number = name.substr(0, name.find('_'));
     readProjections(folder / "calib" / (number + ".txt"), "P" + camera.left, "P" + camera.right)
         .assignTo(frame);
+    return frame;
+  }
+
+  KittiFrame openGroundTruth(const std::string& name) const {
+    KittiFrame frame;
+    frame.name = fs::path(name).stem().string();
     frame.disp_noc = groundTruth("disp_noc", name);
     frame.disp_occ = groundTruth("disp_occ", name);
     return frame;
@@ -217,35 +224,51 @@ struct BenchmarkFiles {
   }
 };
 
-std::vector<KittiFrame> openBenchmark(const fs::path& folder, const CameraNames& camera, double rate,
-                                      std::vector<std::string>* incomplete) {
-  const BenchmarkFiles files{folder, camera};
-  std::set<std::string> names;
-  for (const std::string& side : {camera.left, camera.right}) {
-    const std::vector<std::string> images = listFiles(files.images(side), "_10.png");
-    names.insert(images.begin(), images.end());
-  }
+/// The frames of which `open` finds all files.
+std::vector<KittiFrame> openFrames(const fs::path& folder, const std::set<std::string>& names,
+                                   const std::function<KittiFrame(const std::string&)>& open,
+                                   std::vector<IncompleteKittiFrame>* incomplete) {
   std::vector<KittiFrame> frames;
-  std::int64_t index = 0;
   for (const std::string& name : names) {
     try {
-      frames.push_back(files.open(name));
-      frames.back().left_stamp = frames.back().right_stamp =
-          EPOCH + std::llround(static_cast<double>(index) / rate * static_cast<double>(SECOND));
+      frames.push_back(open(name));
     } catch (const std::runtime_error& error) {
       if (incomplete == nullptr) throw;
-      incomplete->emplace_back(error.what());
+      incomplete->push_back({fs::path(name).stem().string(), error.what()});
     }
-    ++index;
   }
-  if (frames.empty()) fail(folder, "no frame is complete: ", incomplete->front());
+  if (frames.empty()) fail(folder, "no frame is complete: ", incomplete->front().problem);
   return frames;
+}
+
+/// Names of the benchmark's frames in folders, as far as these exist.
+std::set<std::string> frameNames(const std::vector<fs::path>& folders) {
+  std::set<std::string> names;
+  for (const fs::path& folder : folders) {
+    const std::vector<std::string> files = listFiles(folder, "_10.png");
+    names.insert(files.begin(), files.end());
+  }
+  return names;
+}
+
+std::vector<KittiFrame> openBenchmark(const fs::path& folder, const CameraNames& camera, double rate,
+                                      std::vector<IncompleteKittiFrame>* incomplete) {
+  const BenchmarkFiles files{folder, camera};
+  const std::set<std::string> names = frameNames({files.images(camera.left), files.images(camera.right)});
+  const auto open = [&](const std::string& name) {
+    KittiFrame frame = files.open(name);
+    const auto index = std::distance(names.begin(), names.find(name));
+    frame.left_stamp = frame.right_stamp =
+        EPOCH + std::llround(static_cast<double>(index) / rate * static_cast<double>(SECOND));
+    return frame;
+  };
+  return openFrames(folder, names, open, incomplete);
 }
 
 }  // namespace
 
 KittiDataset openKittiDataset(const std::string& folder, KittiCameras cameras, double benchmark_rate,
-                              std::vector<std::string>* incomplete) {
+                              std::vector<IncompleteKittiFrame>* incomplete) {
   requireArgument(benchmark_rate > 0.0 && std::isfinite(benchmark_rate), "benchmark_rate", benchmark_rate,
                   "a positive number");
   const fs::path path(folder);
@@ -263,6 +286,18 @@ KittiDataset openKittiDataset(const std::string& folder, KittiCameras cameras, d
     return {KittiLayout::STEREO_BENCHMARK, openBenchmark(path, camera, benchmark_rate, incomplete)};
   }
   return {KittiLayout::ODOMETRY, openOdometry(path, camera)};
+}
+
+std::vector<KittiFrame> listGroundTruth(const std::string& folder,
+                                        std::vector<IncompleteKittiFrame>* incomplete) {
+  const BenchmarkFiles files{fs::path(folder), {}};
+  std::vector<fs::path> folders;
+  for (const char* kind : {"disp_noc", "disp_occ"}) {
+    if (fs::is_directory(files.folder / kind)) folders.push_back(files.folder / kind);
+  }
+  if (folders.empty()) fail(files.folder, "no ground truth, expected a folder disp_noc or disp_occ");
+  const auto open = [&](const std::string& name) { return files.openGroundTruth(name); };
+  return openFrames(files.folder, frameNames(folders), open, incomplete);
 }
 
 }  // namespace disparity_refinement

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <locale>
 #include <opencv2/imgcodecs.hpp>
@@ -18,6 +19,7 @@ namespace {
 constexpr float PNG_SCALE = 256.0F;
 
 std::ifstream openFile(const std::string& path) {
+  if (std::filesystem::is_directory(path)) throw std::runtime_error(path + " is a folder, expected a file");
   std::ifstream file(path, std::ios::binary);
   if (!file) throw std::runtime_error("cannot open " + path);
   return file;

@@ -45,7 +45,10 @@ class VisualizationNodelet : public LazyNodelet {
     ros::NodeHandle& private_nh = getPrivateNodeHandle();
     monitor_ = std::make_unique<StageMonitor>(getName(), nh, private_nh);
     parameters_ = std::make_unique<LiveParameters<VisualizationConfig>>(private_nh);
-    transport_ = std::make_unique<image_transport::ImageTransport>(nh);
+    {
+      const std::lock_guard<std::mutex> lock(imageTransportMutex());
+      transport_ = std::make_unique<image_transport::ImageTransport>(nh);
+    }
     constexpr std::size_t PICTURES = 4;
     worker_ =
         std::make_unique<FrameWorker<Picture>>(PICTURES, *monitor_, [](const Picture& draw) { draw(); });

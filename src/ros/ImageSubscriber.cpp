@@ -1,13 +1,11 @@
 #include "disparity_refinement/ros/ImageSubscriber.hpp"
 
-#include <mutex>
-
 namespace disparity_refinement {
-namespace {
 
-std::mutex plugin_mutex;
-
-}  // namespace
+std::mutex& imageTransportMutex() {
+  static std::mutex mutex;
+  return mutex;
+}
 
 void ImageSubscriber::subscribe(ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
                                 const std::string& topic, std::uint32_t queue_size,
@@ -18,7 +16,7 @@ void ImageSubscriber::subscribe(ros::NodeHandle& nh, const ros::NodeHandle& priv
     raw_ = nh.subscribe<sensor_msgs::Image>(topic, queue_size, callback, ros::VoidConstPtr(), ros_hints);
     return;
   }
-  const std::lock_guard<std::mutex> lock(plugin_mutex);
+  const std::lock_guard<std::mutex> lock(imageTransportMutex());
   if (!transport_) transport_ = std::make_unique<image_transport::ImageTransport>(nh);
   other_ = transport_->subscribe(topic, queue_size, callback, ros::VoidPtr(), hints);
 }
@@ -28,7 +26,7 @@ void ImageSubscriber::shutdown() {
   if (!transport_) return;
   // Without the mutex: it waits for a callback.
   other_.shutdown();
-  const std::lock_guard<std::mutex> lock(plugin_mutex);
+  const std::lock_guard<std::mutex> lock(imageTransportMutex());
   other_ = image_transport::Subscriber();
   transport_.reset();
 }

@@ -2,12 +2,15 @@
 
 #include <exception>
 
+#include "disparity_refinement/ros/ImageSubscriber.hpp"
+
 namespace disparity_refinement {
 
 image_transport::Publisher LazyNodelet::advertiseImage(image_transport::ImageTransport& transport,
                                                        const std::string& topic) {
   const image_transport::SubscriberStatusCallback changed =
       [this](const image_transport::SingleSubscriberPublisher&) { update(); };
+  const std::lock_guard<std::mutex> lock(imageTransportMutex());
   return transport.advertise(topic, PUBLISHER_QUEUE_SIZE, changed, changed);
 }
 

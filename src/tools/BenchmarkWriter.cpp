@@ -3,11 +3,11 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <limits>
-#include <opencv2/imgcodecs.hpp>
+#include <sstream>
 #include <stdexcept>
 
+#include "OutputFiles.hpp"
 #include "disparity_refinement/evaluation/KittiFiles.hpp"
 
 namespace disparity_refinement {
@@ -17,10 +17,6 @@ namespace fs = std::filesystem;
 
 constexpr std::array<const char*, 4> FOLDERS{"image_0", "image_1", "disp_noc", "calib"};
 
-void writeImage(const std::string& file, const cv::Mat& image) {
-  if (!cv::imwrite(file, image)) throw std::runtime_error("cannot write " + file);
-}
-
 void writeMatrix(std::ostream& out, const char* key, const ProjectionMatrix& matrix) {
   out << key << ":";
   for (const double entry : matrix) out << " " << entry;
@@ -29,15 +25,13 @@ void writeMatrix(std::ostream& out, const char* key, const ProjectionMatrix& mat
 
 }  // namespace
 
-BenchmarkWriter::BenchmarkWriter(const std::string& folder, bool overwrite) : folder_(folder) {
-  for (const char* name : FOLDERS) {
-    const fs::path path = fs::path(folder) / name;
-    if (fs::exists(path) && !overwrite) {
-      throw std::runtime_error(path.string() + " exists already, expected a new folder or --force");
-    }
-    fs::remove_all(path);
-    fs::create_directories(path);
+BenchmarkWriter::BenchmarkWriter(const std::string& folder) : folder_(folder) {
+  if (folder.empty()) throw std::runtime_error("the name of the folder is empty");
+  // What is there may be a data set that nobody wants to lose.
+  if (fs::exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder))) {
+    throw std::runtime_error(folder + " exists already, expected a new or an empty folder");
   }
+  for (const char* name : FOLDERS) fs::create_directories(fs::path(folder) / name);
 }
 
 void BenchmarkWriter::write(const cv::Mat& left, const cv::Mat& right, const cv::Mat& disparity,
@@ -48,17 +42,15 @@ void BenchmarkWriter::write(const cv::Mat& left, const cv::Mat& right, const cv:
   const auto file = [&](const char* name, const char* end) {
     return (fs::path(folder_) / name / (number + std::string(end))).string();
   };
-  writeImage(file("image_0", "_10.png"), left);
-  writeImage(file("image_1", "_10.png"), right);
+  writeImageFile(file("image_0", "_10.png"), left);
+  writeImageFile(file("image_1", "_10.png"), right);
   writeDisparityPng(file("disp_noc", "_10.png"), disparity,
                     {std::numeric_limits<float>::min(), std::numeric_limits<float>::max()});
-  const std::string calibration = file("calib", ".txt");
-  std::ofstream stream(calibration);
+  std::ostringstream stream;
   stream.precision(std::numeric_limits<double>::max_digits10);
   writeMatrix(stream, "P0", left_projection);
   writeMatrix(stream, "P1", right_projection);
-  stream.close();
-  if (!stream) throw std::runtime_error("cannot write " + calibration);
+  writeTextFile(file("calib", ".txt"), stream.str());
 }
 
 }  // namespace disparity_refinement

@@ -11,9 +11,8 @@ namespace disparity_refinement {
 /// and image_1 (NNNNNN_10.png), disp_noc, calib (NNNNNN.txt). KittiDataset reads it.
 class BenchmarkWriter {
  public:
-  /// Makes the folder. Throws std::runtime_error if there are frames in it that must not be overwritten; else
-  /// they are removed.
-  BenchmarkWriter(const std::string& folder, bool overwrite);
+  /// Makes the folder. Throws std::runtime_error unless it is new or empty.
+  explicit BenchmarkWriter(const std::string& folder);
 
   /// @param left, right  CV_8UC1
   /// @param disparity    Ground truth of the left image [px], CV_32FC1, 0 where unknown.

@@ -8,11 +8,11 @@
 #include <filesystem>
 #include <mutex>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <set>
 #include <stdexcept>
 #include <thread>
 
+#include "OutputFiles.hpp"
 #include "disparity_refinement/StereoGeometry.hpp"
 #include "disparity_refinement/arguments.hpp"
 #include "disparity_refinement/evaluation/KittiFiles.hpp"
@@ -35,6 +35,7 @@ double timed(const Step& step) {
 struct LoadedFrame {
   std::string name;
   cv::Mat left, right;  ///< Empty if all methods have finished maps.
+  cv::Size size;
   StereoGeometry geometry;
   std::map<std::string, cv::Mat> ground_truth;
 };
@@ -42,17 +43,18 @@ struct LoadedFrame {
 LoadedFrame load(const KittiFrame& files, bool with_images) {
   LoadedFrame frame;
   frame.name = files.name;
-  frame.left = readGrayImage(files.left);
-  const cv::Size size = frame.left.size();
   if (with_images) {
+    frame.left = readGrayImage(files.left);
     frame.right = readGrayImage(files.right);
-    requireSizeOfLeftImage(files.right, frame.right, size);
+    frame.size = frame.left.size();
+    requireSizeOfLeftImage(files.right, frame.right, frame.size);
     frame.geometry = stereoGeometry(files.left_projection, files.right_projection);
   }
   const auto load_truth = [&](const char* kind, const std::string& file) {
     if (file.empty()) return;
     cv::Mat truth = readDisparityPng(file);
-    requireSizeOfLeftImage(file, truth, size);
+    if (frame.size.empty()) frame.size = truth.size();
+    requireSizeOfLeftImage(file, truth, frame.size);
     if (cv::countNonZero(truth) == 0) {
       throw std::runtime_error(file + " has no pixel above 0, expected a ground truth");
     }
@@ -92,7 +94,7 @@ class FrameEvaluator {
     } else {
       const std::string file = (fs::path(method.maps) / (frame.name + ".png")).string();
       map_ = readDisparityPng(file);
-      requireSizeOfLeftImage(file, map_, frame.left.size());
+      requireSizeOfLeftImage(file, map_, frame.size);
     }
     for (const auto& [kind, truth] : frame.ground_truth) {
       figures.scores[kind] = scoreDisparity(map_, KITTI_PNG_RANGE, truth);
@@ -145,8 +147,7 @@ class FrameEvaluator {
     picture.ground_truth = frame.ground_truth.begin()->second;
     picture.disparity_title = matcherName(matcher_.parameters());
     picture.refined_title = method.name;
-    const std::string file = fileOf(options_.pictures, method, frame);
-    if (!cv::imwrite(file, drawRefinement(picture))) throw std::runtime_error("cannot write " + file);
+    writeImageFile(fileOf(options_.pictures, method, frame), drawRefinement(picture));
   }
 
   static std::string fileOf(const std::string& folder, const EvaluatedMethod& method,
@@ -257,8 +258,9 @@ Evaluation evaluate(const std::vector<KittiFrame>& frames, const std::vector<Eva
       progress(++done, static_cast<int>(frames.size()));
     }
   };
+  const std::size_t workers = std::min(static_cast<std::size_t>(options.threads), frames.size());
   std::vector<std::thread> threads;
-  for (int i = 1; i < options.threads; ++i) threads.emplace_back(work);
+  for (std::size_t i = 1; i < workers; ++i) threads.emplace_back(work);
   work();
   for (std::thread& thread : threads) thread.join();
 

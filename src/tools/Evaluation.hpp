@@ -52,8 +52,9 @@ struct Evaluation {
   EvaluationFigures mean(std::size_t method) const;
 };
 
-/// Scores methods on the frames of a stereo benchmark folder with ground truth. The map that is scored has
-/// the values that its PNG would hold, so that the figures are those of the devkit.
+/// Scores methods on the frames of a stereo benchmark folder with ground truth; finished maps need no images.
+/// The map that is scored has the values that its PNG would hold, so that the figures are those of the
+/// devkit.
 ///
 /// The figures but the times do not depend on the number of threads. A frame's matching is computed once for
 /// consecutive methods with the same matcher, and so is its segmentation; each of them is given its time.

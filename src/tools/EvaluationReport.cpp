@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <ostream>
-#include <stdexcept>
+
+#include "OutputFiles.hpp"
 
 namespace disparity_refinement {
 namespace {
@@ -69,19 +69,18 @@ Json toJson(const EvaluatedMethod& method, const EvaluationFigures& mean, std::s
   return json;
 }
 
-void writeFile(const std::string& file, const std::string& text) {
-  std::ofstream stream(file);
-  stream << text;
-  stream.close();
-  if (!stream) throw std::runtime_error("cannot write " + file);
+/// A field of a CSV file that may hold commas and quotes.
+std::string quoted(const std::string& text) {
+  std::string field = "\"";
+  for (const char c : text) field += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return field + "\"";
 }
 
 std::string csvLines(const EvaluatedMethod& method, const std::string& frame,
                      const EvaluationFigures& figures) {
   std::string text;
   for (const auto& [kind, score] : figures.scores) {
-    // Names hold commas.
-    text += "\"" + method.name + "\"," + frame + "," + kind + format(",%.6f", 100.0 * score.density);
+    text += quoted(method.name) + "," + frame + "," + kind + format(",%.6f", 100.0 * score.density);
     for (const DisparityErrors& errors : {score.all, score.est}) {
       for (const double outliers : errors.outliers) text += format(",%.6f", 100.0 * outliers);
       text += format(",%.6f", errors.end_point_error);
@@ -142,7 +141,7 @@ void writeJson(const Evaluation& evaluation, const std::string& file) {
   for (std::size_t m = 0; m < evaluation.methods.size(); ++m) {
     json.push_back(toJson(evaluation.methods[m], evaluation.mean(m), evaluation.frames.size()));
   }
-  writeFile(file, json.dump(2) + "\n");
+  writeTextFile(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 void writeCsv(const Evaluation& evaluation, const std::string& file) {
@@ -159,7 +158,7 @@ void writeCsv(const Evaluation& evaluation, const std::string& file) {
     }
     text += csvLines(method, "mean", evaluation.mean(m));
   }
-  writeFile(file, text);
+  writeTextFile(file, text);
 }
 
 }  // namespace disparity_refinement

@@ -76,6 +76,8 @@ bool setIfKnown(Config& config, const std::string& name, const YAML::Node& value
     if (entry != name || !is_good) return;
     Type number{};
     is_good = YAML::convert<Type>::decode(value, number);
+    // 010 would be octal.
+    if constexpr (std::is_same_v<Type, int>) is_good = is_good && value.Scalar() == std::to_string(number);
     if constexpr (!std::is_same_v<Type, bool>) {
       // Written so that NaN is refused.
       is_good = is_good && number >= std::get<Type>(toValues(Config::__getMin__()).at(name)) &&
@@ -84,8 +86,8 @@ bool setIfKnown(Config& config, const std::string& name, const YAML::Node& value
     if (is_good) field = number;
   });
   if (!is_good) {
-    throw std::invalid_argument(name + " is " + YAML::Dump(value) + ", expected " +
-                                expectation<Config>(name));
+    const std::string text = value.IsScalar() ? value.Scalar() : "no single value";
+    throw std::invalid_argument(name + " is " + text + ", expected " + expectation<Config>(name));
   }
   config.__fromMessage__(message);
   return true;
@@ -110,6 +112,7 @@ auto checkedParameters(const Config& config) {
 template <class Config>
 void loadSection(const YAML::Node& section, const std::string& name, Config& config,
                  std::vector<std::string>& unknown) {
+  if (section.IsNull()) return;
   if (!section.IsMap()) throw std::invalid_argument(name + " is no map of parameters");
   for (const auto& entry : section) {
     const auto key = entry.first.as<std::string>();

@@ -1,12 +1,15 @@
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <sstream>
+#include <stdexcept>
 #include <thread>
 
 #include "CommandLine.hpp"
 #include "Evaluation.hpp"
 #include "EvaluationReport.hpp"
+#include "OutputFiles.hpp"
 #include "disparity_refinement/arguments.hpp"
 
 namespace disparity_refinement {
@@ -29,35 +32,86 @@ std::vector<std::string> split(const std::string& text, char separator) {
   return parts;
 }
 
-int parseNumber(const std::string& text, const std::string& list) {
-  const bool is_number =
-      !text.empty() && text.size() < 9 && text.find_first_not_of("0123456789") == std::string::npos;
-  requireArgument(is_number, "frames", list, "numbers and ranges such as 0,4,100-120");
-  return std::stoi(text);
-}
-
-/// The frames whose numbers are in a list such as "0,4,100-120".
-std::vector<KittiFrame> selectFrames(const std::vector<KittiFrame>& frames, const std::string& list) {
-  std::vector<KittiFrame> selected;
-  const auto number_of = [](const KittiFrame& frame) { return std::atoi(frame.name.c_str()); };
-  for (const std::string& part : split(list, ',')) {
-    const auto dash = part.find('-');
-    const int first = parseNumber(part.substr(0, dash), list);
-    const int last = dash == std::string::npos ? first : parseNumber(part.substr(dash + 1), list);
-    const std::size_t before = selected.size();
-    std::copy_if(frames.begin(), frames.end(), std::back_inserter(selected), [&](const KittiFrame& frame) {
-      return number_of(frame) >= first && number_of(frame) <= last;
-    });
-    requireArgument(selected.size() > before, "frames", part,
-                    "numbers of frames, which are " + std::to_string(number_of(frames.front())) + " ... " +
-                        std::to_string(number_of(frames.back())) + " here");
+/// Frames by a list of numbers and ranges such as "0,4,100-120"; all for an empty list.
+class FrameSelection {
+ public:
+  explicit FrameSelection(const std::string& list) {
+    for (const std::string& part : split(list, ',')) {
+      const auto dash = part.find('-');
+      const int first = parseNumber(part.substr(0, dash), list);
+      const int last = dash == std::string::npos ? first : parseNumber(part.substr(dash + 1), list);
+      ranges_.push_back({first, last, part});
+    }
+    requireArgument(list.empty() || !ranges_.empty(), "frames", list, EXPECTED);
   }
-  requireArgument(!selected.empty(), "frames", list, "numbers and ranges such as 0,4,100-120");
-  const auto by_name = [](const KittiFrame& a, const KittiFrame& b) { return a.name < b.name; };
-  const auto same_name = [](const KittiFrame& a, const KittiFrame& b) { return a.name == b.name; };
-  std::sort(selected.begin(), selected.end(), by_name);
-  selected.erase(std::unique(selected.begin(), selected.end(), same_name), selected.end());
-  return selected;
+
+  bool has(const std::string& frame) const {
+    return ranges_.empty() ||
+           std::any_of(ranges_.begin(), ranges_.end(), [&](const Range& range) { return range.has(frame); });
+  }
+
+  /// Throws unless every part of the list is the number of a frame.
+  void requireFrames(const std::vector<std::string>& frames) const {
+    for (const Range& range : ranges_) {
+      const bool found =
+          std::any_of(frames.begin(), frames.end(), [&](const auto& frame) { return range.has(frame); });
+      requireArgument(found, "frames", range.text,
+                      "numbers of frames, which are " + std::to_string(numberOf(frames.front())) + " ... " +
+                          std::to_string(numberOf(frames.back())) + " here");
+    }
+  }
+
+ private:
+  static constexpr const char* EXPECTED = "numbers and ranges such as 0,4,100-120";
+
+  struct Range {
+    int first, last;
+    std::string text;
+
+    bool has(const std::string& frame) const { return numberOf(frame) >= first && numberOf(frame) <= last; }
+  };
+
+  static int numberOf(const std::string& frame) { return std::atoi(frame.c_str()); }
+
+  static int parseNumber(const std::string& text, const std::string& list) {
+    const bool is_number =
+        !text.empty() && text.size() < 9 && text.find_first_not_of("0123456789") == std::string::npos;
+    requireArgument(is_number, "frames", list, EXPECTED);
+    return std::stoi(text);
+  }
+
+  std::vector<Range> ranges_;
+};
+
+/// The frames to score, and in `left_out` what is wrong with the others that were selected.
+std::vector<KittiFrame> openFrames(const std::string& folder, bool with_images,
+                                   const FrameSelection& selection, bool keep_going,
+                                   std::vector<std::string>& left_out) {
+  std::vector<IncompleteKittiFrame> incomplete;
+  std::vector<KittiFrame> frames;
+  if (with_images) {
+    frames = openKittiDataset(folder, KittiCameras::GRAY, 10.0, &incomplete).frames;
+    if (frames.front().disp_noc.empty() && frames.front().disp_occ.empty()) {
+      throw std::runtime_error(folder + ": no ground truth, expected a folder disp_noc or disp_occ");
+    }
+  } else {
+    frames = listGroundTruth(folder, &incomplete);
+  }
+  std::vector<std::string> names;
+  for (const KittiFrame& frame : frames) names.push_back(frame.name);
+  for (const IncompleteKittiFrame& frame : incomplete) names.push_back(frame.name);
+  std::sort(names.begin(), names.end());
+  selection.requireFrames(names);
+
+  for (const IncompleteKittiFrame& frame : incomplete) {
+    if (!selection.has(frame.name)) continue;
+    if (!keep_going) throw std::runtime_error(frame.problem);
+    left_out.push_back(frame.problem);
+  }
+  frames.erase(std::remove_if(frames.begin(), frames.end(),
+                              [&](const KittiFrame& frame) { return !selection.has(frame.name); }),
+               frames.end());
+  return frames;
 }
 
 std::string refinedName(const StageParameters& parameters, const std::string& variant) {
@@ -67,30 +121,50 @@ std::string refinedName(const StageParameters& parameters, const std::string& va
   return matcherName(parameters.matching()) + " + " + (variant.empty() ? settings : variant);
 }
 
-/// The refinement with every variant of the parameters; before it, once for consecutive variants with the
-/// same one, the matcher alone.
+/// The refinement with every variant of the parameters; before it, once for every matcher among them, the
+/// matcher alone.
 std::vector<EvaluatedMethod> makeMethods(const StageParameters& base, std::vector<std::string> variants) {
   if (variants.empty()) variants.emplace_back();
   std::vector<EvaluatedMethod> methods;
   for (const std::string& variant : variants) {
     EvaluatedMethod method;
     method.parameters = base;
+    std::string matcher_settings;
     for (const std::string& assignment : split(variant, ',')) {
       const auto equals = assignment.find('=');
-      requireArgument(equals != std::string::npos, "variant", variant, "NAME=VALUE[,NAME=VALUE...]");
-      method.parameters.set(assignment.substr(0, equals), assignment.substr(equals + 1));
+      requireArgument(equals != std::string::npos && equals > 0, "variant", variant,
+                      "NAME=VALUE[,NAME=VALUE...]");
+      const std::string name = assignment.substr(0, equals);
+      method.parameters.set(name, assignment.substr(equals + 1));
+      if (base.matchingValues().count(name) > 0) matcher_settings += ", " + assignment;
     }
-    if (methods.empty() || !methods.back().parameters.hasSameMatching(method.parameters)) {
+    const bool is_known = std::any_of(methods.begin(), methods.end(), [&](const EvaluatedMethod& other) {
+      return other.parameters.hasSameMatching(method.parameters);
+    });
+    if (!is_known) {
       EvaluatedMethod matcher = method;
       matcher.is_refined = false;
       matcher.name = matcherName(method.parameters.matching());
-      if (!base.hasSameMatching(method.parameters)) matcher.name += ", " + variant;
+      if (!base.hasSameMatching(method.parameters)) matcher.name += matcher_settings;
       methods.push_back(matcher);
     }
     method.name = refinedName(method.parameters, variant);
     methods.push_back(method);
   }
   return methods;
+}
+
+/// Everything that has no meaning for finished maps.
+void refuseWithMaps(const po::variables_map& values) {
+  const auto refuse = [](const std::string& name) {
+    throw std::invalid_argument("--" + name + " and --maps exclude each other");
+  };
+  for (const char* name : {"variant", "params", "write-maps", "pictures"}) {
+    if (values.count(name) > 0) refuse(name);
+  }
+  for (const auto& parameter : StageParameters().values()) {
+    if (values.count(parameter.first) > 0) refuse(parameter.first);
+  }
 }
 
 void run(int argc, char** argv) {
@@ -125,30 +199,28 @@ void run(int argc, char** argv) {
   std::vector<EvaluatedMethod> methods;
   if (maps.empty()) {
     methods = makeMethods(base, variants);
+    if (!name.empty()) throw std::invalid_argument("--name is for --maps");
   } else {
-    if (!variants.empty()) throw std::invalid_argument("--variant and --maps exclude each other");
+    refuseWithMaps(values);
     EvaluatedMethod method;
     method.maps = maps;
     method.name = name.empty() ? std::filesystem::path(maps + "/").parent_path().filename().string() : name;
     methods = {method};
   }
-
-  const auto folder = values["TRAINING_DIR"].as<std::string>();
-  std::vector<std::string> incomplete;
-  KittiDataset dataset =
-      openKittiDataset(folder, KittiCameras::GRAY, 10.0, options.keep_going ? &incomplete : nullptr);
-  if (dataset.frames.front().disp_noc.empty() && dataset.frames.front().disp_occ.empty()) {
-    throw std::runtime_error(folder + ": no ground truth, expected a folder disp_noc or disp_occ");
+  for (const std::string& file : {json, csv}) {
+    if (!file.empty()) requireWritable(file);
   }
-  if (!frames.empty()) dataset.frames = selectFrames(dataset.frames, frames);
 
+  std::vector<std::string> left_out;
+  const std::vector<KittiFrame> selected = openFrames(values["TRAINING_DIR"].as<std::string>(), maps.empty(),
+                                                      FrameSelection(frames), options.keep_going, left_out);
   Evaluation evaluation;
   {
     ProgressLine progress;
     evaluation =
-        evaluate(dataset.frames, methods, options, [&](int done, int total) { progress.show(done, total); });
+        evaluate(selected, methods, options, [&](int done, int total) { progress.show(done, total); });
   }
-  evaluation.left_out.insert(evaluation.left_out.begin(), incomplete.begin(), incomplete.end());
+  evaluation.left_out.insert(evaluation.left_out.begin(), left_out.begin(), left_out.end());
   printTables(evaluation, std::cout);
   if (!json.empty()) writeJson(evaluation, json);
   if (!csv.empty()) writeCsv(evaluation, csv);

@@ -6,14 +6,13 @@
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
-#include <opencv2/imgcodecs.hpp>
 #include <sstream>
 #include <stdexcept>
 #include <vector>
 
 #include "CommandLine.hpp"
+#include "OutputFiles.hpp"
 #include "StageParameters.hpp"
 #include "disparity_refinement/arguments.hpp"
 #include "disparity_refinement/evaluation/KittiFiles.hpp"
@@ -51,13 +50,6 @@ struct Mark {
 /// The settings of the paper's Figure 5.
 std::array<Mark, 3> paperMarks() { return {Mark{5, 2, 0, {}}, Mark{30, 5, 0, {}}, Mark{80, 15, 0, {}}}; }
 
-void writeText(const std::string& file, const std::string& text) {
-  std::ofstream stream(file);
-  stream << text;
-  stream.close();
-  if (!stream) throw std::runtime_error("cannot write " + file);
-}
-
 std::string csv(const cv::Mat& surface) {
   std::ostringstream text;
   text << "lambda,h,segments\n";
@@ -71,6 +63,9 @@ std::string csv(const cv::Mat& surface) {
 
 /// What gnuplot draws the surface with. The counts span four decades, hence the logarithmic axis.
 std::string gnuplotScript(const cv::Mat& surface, const std::array<Mark, 3>& marks) {
+  // Of their own, or gnuplot fails on a flat surface.
+  double smallest = 0.0, largest = 0.0;
+  cv::minMaxLoc(surface, &smallest, &largest);
   std::ostringstream script;
   script << "$surface << END\n";
   for (int lambda = 0; lambda < surface.rows; ++lambda) {
@@ -96,6 +91,10 @@ std::string gnuplotScript(const cv::Mat& surface, const std::array<Mark, 3>& mar
             "set zlabel 'segments' rotate parallel\n"
             "set xrange [0:"
          << surface.rows - 1 << "]\nset yrange [0:" << surface.cols - 1
+         << "]\n"
+            "set zrange ["
+         << 0.9 * smallest << ":" << 1.1 * largest << "]\nset cbrange [" << 0.9 * smallest << ":"
+         << 1.1 * largest
          << "]\n"
             "set ticslevel 0\n"
             "set view 50, 140\n"
@@ -141,7 +140,7 @@ void run(int argc, char** argv) {
   po::options_description description("Options");
   description.add_options()("output,o", po::value(&folder)->value_name("DIR")->default_value(folder),
                             "where to")("max-lambda", po::value(&max_lambda)->default_value(max_lambda),
-                                        "largest lambda [px], at least 80")(
+                                        "largest lambda [px], 80 ... 1000")(
       "max-h", po::value(&max_h)->default_value(max_h), "largest h [gray levels], 15 ... 255");
   po::options_description parameter_options("Parameters, as for the nodelet");
   StageParameters::addSegmentationOptions(parameter_options);
@@ -149,8 +148,8 @@ void run(int argc, char** argv) {
   po::variables_map values;
   if (!parseCommandLine(argc, argv, USAGE, {"IMAGE"}, description, values)) return;
   std::array<Mark, 3> marks = paperMarks();
-  requireArgument(max_lambda >= marks.back().lambda && max_lambda <= 100000, "max-lambda", max_lambda,
-                  "80 ... 100000");
+  requireArgument(max_lambda >= marks.back().lambda && max_lambda <= 1000, "max-lambda", max_lambda,
+                  "80 ... 1000");
   requireArgument(max_h >= marks.back().h && max_h <= 255, "max-h", max_h, "15 ... 255");
   StageParameters parameters;
   parameters.readOptions(values);
@@ -168,10 +167,8 @@ void run(int argc, char** argv) {
 
   fs::create_directories(folder);
   const auto file = [&folder](const char* name) { return (fs::path(folder) / name).string(); };
-  writeText(file("surface.csv"), csv(surface));
-  if (!cv::imwrite(file("segments.png"), drawSegmentations(gray, marks))) {
-    throw std::runtime_error("cannot write " + file("segments.png"));
-  }
+  writeTextFile(file("surface.csv"), csv(surface));
+  writeImageFile(file("segments.png"), drawSegmentations(gray, marks));
   for (const Mark& mark : marks) std::cout << mark.text() << "\n";
   plot(gnuplotScript(surface, marks), file("surface.png"));
 }

@@ -1,10 +1,12 @@
-#include <cstdio>
+#include <cmath>
+#include <filesystem>
 #include <iostream>
 #include <limits>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
+#include <set>
 
 #include "CommandLine.hpp"
+#include "OutputFiles.hpp"
 #include "PointCloudFile.hpp"
 #include "StageParameters.hpp"
 #include "disparity_refinement/arguments.hpp"
@@ -37,6 +39,24 @@ struct Calibration {
 struct Outputs {
   std::string png, color, pfm, ply, picture;
   float color_max = 64.0F;  ///< Near end of the colour scale [px]
+
+  /// Throws std::invalid_argument unless every name has the ending of its format and is another one.
+  void validate() const {
+    const auto require_ending = [](const std::string& option, const std::string& file,
+                                   const std::string& ending) {
+      requireArgument(file.empty() || std::filesystem::path(file).extension() == ending, option, file,
+                      "a file name that ends with " + ending);
+    };
+    require_ending("output", png, ".png");
+    require_ending("pfm", pfm, ".pfm");
+    require_ending("ply", ply, ".ply");
+    std::set<std::string> names;
+    for (const std::string& file : {png, color, pfm, ply, picture}) {
+      if (!file.empty() && !names.insert(file).second) {
+        throw std::invalid_argument(file + " is the name of two outputs");
+      }
+    }
+  }
 
   bool any() const {
     return !png.empty() || !color.empty() || !pfm.empty() || !ply.empty() || !picture.empty();
@@ -83,23 +103,13 @@ std::optional<Calibration> calibrationOf(const po::variables_map& values, const 
   return calibration;
 }
 
-void writeImage(const std::string& file, const cv::Mat& image) {
-  bool is_written = false;
-  try {
-    is_written = cv::imwrite(file, image);
-  } catch (const cv::Exception&) {
-    // An ending that OpenCV does not know.
-  }
-  if (!is_written) throw std::runtime_error("cannot write " + file);
-}
-
 /// Unknown disparities are infinite there, as in Middlebury's files.
 void writePfm(const std::string& file, const cv::Mat& disparity, const DisparityRange& range) {
   cv::Mat map = disparity.clone();
   for (float& d : cv::Mat_<float>(map)) {
     if (!range.isValid(d)) d = std::numeric_limits<float>::infinity();
   }
-  writeImage(file, map);
+  writeImageFile(file, map);
 }
 
 void refinePair(const std::string& left_file, const std::string& right_file, StageParameters& parameters,
@@ -107,8 +117,7 @@ void refinePair(const std::string& left_file, const std::string& right_file, Sta
   const cv::Mat left = readGrayImage(left_file), right = readGrayImage(right_file);
   requireSizeOfLeftImage(right_file, right, left.size());
   const std::optional<Calibration> calibration = calibrationOf(values, left.size());
-  requireArgument(outputs.color_max > parameters.matching().min_disparity, "color-max", outputs.color_max,
-                  "more than min_disparity");
+  outputs.validate();
   if (!outputs.ply.empty() && !calibration) {
     throw std::invalid_argument("--ply needs --calibration, or --focal-length and --baseline");
   }
@@ -116,13 +125,20 @@ void refinePair(const std::string& left_file, const std::string& right_file, Sta
     outputs.png = DEFAULT_PNG;
     outputs.color = DEFAULT_COLOR;
   }
-  if (!calibration) parameters.set("disparity_error", "0");
+  if (!calibration) {
+    const double bound = parameters.refinement().disparity_error;
+    requireArgument(bound == PlaneRefinementParameters().disparity_error || bound == 0.0, "disparity_error",
+                    bound, "--calibration, or --focal-length and --baseline, beside it");
+    parameters.set("disparity_error", "0");
+  }
   const StereoGeometry geometry = calibration ? calibration->geometry : StereoGeometry{1.0, 1.0, 0.0};
 
   RefinementPicture result;
   StereoMatcher matcher(parameters.matching());
   matcher.compute(left, right, result.disparity, geometry.principal_point_offset);
   const DisparityRange range = matcher.range(geometry.principal_point_offset);
+  requireArgument(std::isfinite(outputs.color_max) && outputs.color_max > range.min, "color-max",
+                  outputs.color_max, "a number above the smallest disparity, " + std::to_string(range.min));
   const int segments = Segmentation().compute(left, parameters.segmentation(), result.labels);
   PlaneRefinement().refine(result.disparity, result.labels, range, geometry.focal_length * geometry.baseline,
                            parameters.refinement(), result.refined);
@@ -130,6 +146,7 @@ void refinePair(const std::string& left_file, const std::string& right_file, Sta
 
   // Told when everything is written.
   std::string text = std::to_string(segments) + " segments\n";
+  if (!calibration) text += "no focal length and baseline: condition 1 is off\n";
   const auto tell = [&text](const std::string& file, const std::string& what) {
     text += file + ": " + what + "\n";
   };
@@ -140,7 +157,7 @@ void refinePair(const std::string& left_file, const std::string& right_file, Sta
   if (!outputs.color.empty()) {
     cv::Mat bgr;
     colorizeDisparity(result.refined, range, range.min, outputs.color_max, bgr);
-    writeImage(outputs.color, bgr);
+    writeImageFile(outputs.color, bgr);
     tell(outputs.color, "disparity in colours, black where unknown");
   }
   if (!outputs.pfm.empty()) {
@@ -155,7 +172,7 @@ void refinePair(const std::string& left_file, const std::string& right_file, Sta
   if (!outputs.picture.empty()) {
     result.image = left;
     result.scale_max = outputs.color_max;
-    writeImage(outputs.picture, drawRefinement(result));
+    writeImageFile(outputs.picture, drawRefinement(result));
     tell(outputs.picture, "image, segments, disparity before and after");
   }
   std::cout << text;

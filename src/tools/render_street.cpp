@@ -17,7 +17,7 @@ constexpr const char* USAGE =
 Renders a drive through a synthetic street. OUTPUT is
   FILE.bag   a bag with NAMESPACE/{left,right}/image_rect and camera_info, and the exact
              disparities as NAMESPACE/ground_truth/disparity
-  FOLDER     a folder in the layout of KITTI's stereo 2012 benchmark, for evaluate
+  FOLDER     a new folder in the layout of KITTI's stereo 2012 benchmark, for evaluate
 )";
 
 constexpr double FIRST_STAMP = 1e9;  // [s]; any fixed time but 0, which ROS takes for "unknown"
@@ -60,8 +60,9 @@ void renderBag(const Drive& drive, const std::string& output, bool overwrite) {
   bag.finish();
 }
 
-void renderFolder(const Drive& drive, const std::string& output, bool overwrite) {
-  BenchmarkWriter folder(output, overwrite);
+void renderFolder(const Drive& drive, const std::string& output) {
+  SyntheticStreet(drive.street);  // throws before there is a folder
+  BenchmarkWriter folder(output);
   render(drive,
          [&](int, const StreetFrame& rendered, const ProjectionMatrix& left, const ProjectionMatrix& right) {
            folder.write(rendered.left, rendered.right, rendered.disparity, left, right);
@@ -91,7 +92,7 @@ int main(int argc, char** argv) {
         "standard deviation of the image noise [gray levels]")(
         "seed", po::value(&street_parameters.seed)->default_value(street_parameters.seed), "another street")(
         "namespace", po::value(&drive.name_space)->default_value(drive.name_space), "of the topics")(
-        "force", "overwrite OUTPUT");
+        "force", "overwrite FILE.bag");
     po::variables_map values;
     if (!parseCommandLine(argc, argv, USAGE, {"OUTPUT"}, description, values)) return;
     const std::string output = values["OUTPUT"].as<std::string>();
@@ -100,7 +101,11 @@ int main(int argc, char** argv) {
     if (values.count("focal-length") == 0) street_parameters.focal_length = 0.625 * street_parameters.width;
 
     const bool is_bag = std::filesystem::path(output).extension() == ".bag";
-    (is_bag ? renderBag : renderFolder)(drive, output, values.count("force") != 0);
+    if (is_bag) {
+      renderBag(drive, output, values.count("force") != 0);
+    } else {
+      renderFolder(drive, output);
+    }
     std::cout << output << ": " << drive.frames << " stereo frames\n";
   });
 }

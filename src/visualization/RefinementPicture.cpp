@@ -18,7 +18,7 @@ std::string percent(double share) {
   return text;
 }
 
-double density(const cv::Mat& disparity, const DisparityRange& range) {
+double validShare(const cv::Mat& disparity, const DisparityRange& range) {
   const auto valid = std::count_if(disparity.begin<float>(), disparity.end<float>(),
                                    [&range](float d) { return range.isValid(d); });
   return static_cast<double>(valid) / static_cast<double>(disparity.total());
@@ -38,7 +38,7 @@ cv::Mat drawRefinement(const RefinementPicture& frame) {
   const auto add_map = [&](const cv::Mat& map, const DisparityRange& range, const std::string& title) {
     Panel panel;
     colorizeDisparity(map, range, scale_min, scale_max, panel.picture);
-    panel.title = title + ", density " + percent(density(map, range));
+    panel.title = title + ", " + percent(validShare(map, range)) + " valid";
     panels.push_back(panel);
   };
   add_map(frame.disparity, frame.disparity_range, frame.disparity_title);

@@ -154,13 +154,29 @@ TEST(KittiDataset, incompleteFramesOfTheBenchmarkAreLeftOutWhenAsked) {
     const fs::path training = folder / "training";
     writeBenchmark(training);
     fs::remove(training / name);
-    std::vector<std::string> incomplete;
+    std::vector<IncompleteKittiFrame> incomplete;
     const KittiDataset dataset = openKittiDataset(training.string(), KittiCameras::GRAY, 10.0, &incomplete);
     ASSERT_EQ(dataset.frames.size(), 1U) << name;
     EXPECT_EQ(dataset.frames[0].name, "000000_10") << name;
     ASSERT_EQ(incomplete.size(), 1U) << name;
-    EXPECT_EQ(incomplete[0].find((training / name).string()), 0U) << incomplete[0];
+    EXPECT_EQ(incomplete[0].name, "000004_10");
+    EXPECT_EQ(incomplete[0].problem.find((training / name).string()), 0U) << incomplete[0].problem;
   }
+}
+
+TEST(KittiDataset, groundTruthIsListedWithoutImages) {
+  const TemporaryFolder folder;
+  const fs::path training = folder / "training";
+  writeBenchmark(training);
+  for (const char* name : {"image_0", "image_1", "calib"}) fs::remove_all(training / name);
+  EXPECT_EQ(listGroundTruth(training.string()).size(), 2U);
+  fs::remove(training / "disp_noc/000004_10.png");
+  EXPECT_THROW(listGroundTruth(training.string()), std::runtime_error);
+  std::vector<IncompleteKittiFrame> incomplete;
+  EXPECT_EQ(listGroundTruth(training.string(), &incomplete).size(), 1U);
+  EXPECT_EQ(incomplete.size(), 1U);
+  for (const char* name : {"disp_noc", "disp_occ"}) fs::remove_all(training / name);
+  EXPECT_THROW(listGroundTruth(training.string()), std::runtime_error);
 }
 
 TEST(KittiDataset, aBenchmarkWithoutACompleteFrameIsRefused) {
@@ -168,7 +184,7 @@ TEST(KittiDataset, aBenchmarkWithoutACompleteFrameIsRefused) {
   const fs::path training = folder / "training";
   writeBenchmark(training);
   fs::remove_all(training / "calib");
-  std::vector<std::string> incomplete;
+  std::vector<IncompleteKittiFrame> incomplete;
   try {
     openKittiDataset(training.string(), KittiCameras::GRAY, 10.0, &incomplete);
     ADD_FAILURE() << "nothing was thrown";

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "disparity_refinement/ros/LiveParameters.hpp"
 
 namespace disparity_refinement {
@@ -101,6 +103,16 @@ TEST(LiveParameters, fullDpMeansEightDirections) {
   DisparityConfig config = DisparityConfig::__getDefault__();
   config.fullDP = true;
   EXPECT_EQ(toParameters(config).sgbm_mode, SgbmMode::HH);
+}
+
+TEST(LiveParameters, notANumberBecomesTheDefault) {
+  PlaneRefinementConfig config = PlaneRefinementConfig::__getDefault__();
+  config.inlier_threshold = std::numeric_limits<double>::quiet_NaN();
+  config.max_divergence = 7.0;
+  config.__clamp__();
+  replaceNan(config);
+  EXPECT_EQ(config.inlier_threshold, PlaneRefinementParameters().inlier_threshold);
+  EXPECT_EQ(config.max_divergence, 7.0);
 }
 
 }  // namespace

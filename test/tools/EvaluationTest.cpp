@@ -32,7 +32,7 @@ const fs::path& streetFolder() {
     const SyntheticStreet street(parameters);
     const double f = parameters.focal_length;
     const cv::Point2d c = street.principalPoint();
-    BenchmarkWriter writer(training.string(), false);
+    BenchmarkWriter writer(training.string());
     for (int i = 0; i < FRAMES; ++i) {
       const StreetFrame frame = street.render(10 * i);
       writer.write(frame.left, frame.right, frame.disparity, {f, 0, c.x, 0, 0, f, c.y, 0, 0, 0, 1, 0},
@@ -273,10 +273,11 @@ TEST(Evaluation, scoresTheOtherFramesWhenItKeepsGoing) {
     damage.apply(file);
     EvaluationOptions options;
     options.keep_going = true;
-    std::vector<std::string> left_out;
-    const KittiDataset dataset = openKittiDataset(training.string(), KittiCameras::GRAY, 10.0, &left_out);
+    std::vector<IncompleteKittiFrame> incomplete;
+    const KittiDataset dataset = openKittiDataset(training.string(), KittiCameras::GRAY, 10.0, &incomplete);
     const Evaluation evaluation = evaluate(dataset.frames, matcherAndRefinement(), options);
-    left_out.insert(left_out.end(), evaluation.left_out.begin(), evaluation.left_out.end());
+    std::vector<std::string> left_out = evaluation.left_out;
+    for (const IncompleteKittiFrame& frame : incomplete) left_out.push_back(frame.problem);
     EXPECT_EQ(evaluation.frames, (std::vector<std::string>{"000000_10", "000002_10", "000003_10"}))
         << damage.description;
     ASSERT_EQ(left_out.size(), 1U) << damage.description;

@@ -53,6 +53,9 @@ TEST(StageParameters, refusesWhatANodeletWouldReplace) {
             "confidence is nan, expected a number in 0.5 ... 0.9999");
   EXPECT_EQ(refusal([&] { parameters.set("confidence", ".nan"); }),
             "confidence is .nan, expected a number in 0.5 ... 0.9999");
+  EXPECT_EQ(refusal([&] { parameters.set("lambda", "010"); }),
+            "lambda is 010, expected an integer in 0 ... 1000000")
+      << "8 or 10?";
   EXPECT_EQ(refusal([&] { parameters.set("full_width", "2"); }), "full_width is 2, expected true or false");
   EXPECT_NE(refusal([&] { parameters.set("h", "["); }).find("h is "), std::string::npos);
   EXPECT_NE(refusal([&] { parameters.set("h", ""); }).find("h is "), std::string::npos);
@@ -102,6 +105,7 @@ TEST(StageParameters, namesTheFileThatItCannotRead) {
     EXPECT_EQ(load(text).find(file), 0U) << text;
   }
   EXPECT_EQ(load(""), "") << "an empty file sets nothing";
+  EXPECT_EQ(load("segmentation:"), "");
 }
 
 TEST(StageParameters, optionsWinOverTheFile) {

@@ -74,11 +74,14 @@ class Tools : public testing::Test {
   const std::string training;
 };
 
-TEST_F(Tools, streetFolderIsNotOverwrittenUnasked) {
-  expectError("render_street " + training, "image_0 exists already");
-  expectGood("render_street " + training + " --frames 1 --width 320 --height 120 --force");
-  EXPECT_FALSE(fs::exists(training + "/image_0/000001_10.png"));
-  EXPECT_TRUE(fs::exists(training + "/calib/000000.txt"));
+TEST_F(Tools, streetFolderIsNeverOverwritten) {
+  for (const char* force : {"", " --force"}) {
+    expectError("render_street " + training + force,
+                training + " exists already, expected a new or an empty folder");
+  }
+  EXPECT_TRUE(fs::exists(training + "/image_0/000002_10.png"));
+  expectError("render_street " + out("bad") + " --width 9", "width is 9");
+  EXPECT_FALSE(fs::exists(out("bad")));
 }
 
 TEST_F(Tools, evaluatePrintsAndWritesItsFigures) {
@@ -106,6 +109,38 @@ TEST_F(Tools, evaluatePrintsAndWritesItsFigures) {
   EXPECT_EQ(figures(outcome.text, "SGBM 3WAY + h=9"), figures(scored.text, "others"));
 }
 
+TEST_F(Tools, evaluateRunsEveryMatcherOnceInAnyOrderOfTheVariants) {
+  const Outcome outcome = run(
+      "evaluate " + training + " --disparity_range 64 --variant h=1 " +
+      "--variant full_width=true,h=2 --variant h=3 --variant h=4,full_width=true --json " + out("a.json"));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.text;
+  const std::string json = readText(out("a.json"));
+  for (const std::string name :
+       {"SGBM 3WAY", "SGBM 3WAY + h=1", "SGBM 3WAY, full_width=true", "SGBM 3WAY + full_width=true,h=2",
+        "SGBM 3WAY + h=3", "SGBM 3WAY + h=4,full_width=true"}) {
+    const std::string text = "\"name\": \"" + name + "\"";
+    const auto at = json.find(text);
+    EXPECT_NE(at, std::string::npos) << name;
+    EXPECT_EQ(json.find(text, at + 1), std::string::npos) << name;
+  }
+}
+
+TEST_F(Tools, evaluateScoresMapsWithoutImages) {
+  expectGood("evaluate " + training + " --disparity_range 64 --write-maps " + out("maps"));
+  for (const char* name : {"image_0", "image_1", "calib"}) fs::remove_all(training + "/" + name);
+  expectGood("evaluate " + training + " --maps " + out("maps/SGBM_3WAY"));
+}
+
+TEST_F(Tools, evaluateLooksAtTheSelectedFramesOnly) {
+  fs::remove(training + "/image_1/000001_10.png");
+  expectGood("evaluate " + training + " --disparity_range 64 --frames 0,2");
+  expectError("evaluate " + training + " --frames 1-2", training + "/image_1/000001_10.png");
+  const Outcome outcome = run("evaluate " + training + " --disparity_range 64 --frames 0 --keep-going");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.text;
+  EXPECT_EQ(outcome.text.find("Left out"), std::string::npos) << outcome.text;
+  expectError("evaluate " + training + " --frames 1 --keep-going", "no frame could be scored");
+}
+
 TEST_F(Tools, evaluateKeepsGoingWhenAsked) {
   writeText(training + "/image_1/000001_10.png", "no image");
   fs::remove(training + "/disp_noc/000002_10.png");
@@ -127,8 +162,13 @@ TEST_F(Tools, evaluateExplainsWhatItCannotDo) {
   expectError("evaluate " + training + " --lambda -1", "lambda is -1, expected an integer in 0 ... 1000000");
   expectError("evaluate " + training + " --lambda many", "lambda is many");
   expectError("evaluate " + training + " --variant lambda", "variant is lambda, expected NAME=VALUE");
+  expectError("evaluate " + training + " --variant =1", "variant is =1, expected NAME=VALUE");
   expectError("evaluate " + training + " --variant h=1 --maps x", "--variant and --maps exclude each other");
+  expectError("evaluate " + training + " --lambda 1 --maps x", "--lambda and --maps exclude each other");
+  expectError("evaluate " + training + " --name x", "--name is for --maps");
+  expectError("evaluate " + training + " --json " + out("no/a.json"), "cannot write " + out("no/a.json"));
   expectError("evaluate " + training + " --params " + out("none.yaml"), "none.yaml");
+  expectGood("evaluate " + training + " --disparity_range 64 --threads 100000");
   expectError("evaluate " + training + " --threads 0", "threads is 0, expected at least 1");
   fs::rename(training + "/disp_noc", out("hidden"));
   expectError("evaluate " + training, training + ": no ground truth");
@@ -204,6 +244,13 @@ TEST_F(Tools, refineExplainsWhatItCannotDo) {
   expectError("refine " + pair() + " --color " + out("no/map.png"), "cannot write " + out("no/map.png"));
   expectError("refine " + pair() + " --color " + out("map.nothing"), "cannot write " + out("map.nothing"));
   expectError("refine " + pair() + " --color-max -1", "color-max is -1");
+  expectError("refine " + pair() + " --pfm " + out("a.png"), "expected a file name that ends with .pfm");
+  expectError("refine " + pair() + " -o " + out("a.png") + " --color " + out("a.png"),
+              "is the name of two outputs");
+  expectError("refine " + pair() + " --disparity_error 0.5",
+              "disparity_error is 0.5, expected --calibration");
+  expectError("refine " + image("image_0") + " " + folder.string(),
+              folder.string() + " is a folder, expected a file");
   expectError("refine " + pair() + " --calibration " + out("text.png"),
               out("text.png") + ": no line starts with");
   expectError("refine " + image("image_0") + " " + image("image_1") + " --disparity_range 512", "512");
@@ -231,12 +278,17 @@ TEST_F(Tools, influenceSurfaceCountsWhatTheWatershedCounts) {
   EXPECT_EQ(rows, 161 * 61);
   EXPECT_EQ(cv::imread(out("surface/surface.png")).size(), cv::Size(1100, 800));
   EXPECT_GT(cv::imread(out("surface/segments.png")).cols, 2 * 320);
+
+  // A flat image has one segment.
+  writeGray(folder / "flat.png", 9);
+  expectGood("influence_surface " + out("flat.png") + " -o " + out("flat"));
 }
 
 TEST_F(Tools, influenceSurfaceExplainsWhatItCannotDo) {
   expectError("influence_surface " + out("none.png"), "cannot open " + out("none.png"));
   expectError("influence_surface " + image("image_0") + " --max-lambda 20",
               "max-lambda is 20, expected 80 ...");
+  expectError("influence_surface " + image("image_0") + " --max-lambda 1001", "max-lambda is 1001");
   expectError("influence_surface " + image("image_0") + " --max-h 256", "max-h is 256, expected 15 ... 255");
   writeText(folder / "file", "");
   expectError("influence_surface " + image("image_0") + " -o " + out("file"), out("file"));

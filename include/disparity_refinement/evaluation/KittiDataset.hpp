@@ -32,6 +32,12 @@ struct KittiFrame {
   ProjectionMatrix left_projection{}, right_projection{};
 };
 
+/// A frame that lacks a file.
+struct IncompleteKittiFrame {
+  std::string name;
+  std::string problem;  ///< Names the file.
+};
+
 struct KittiDataset {
   KittiLayout layout = KittiLayout::ODOMETRY;
   std::vector<KittiFrame> frames;  ///< At least one, by rising time.
@@ -43,12 +49,18 @@ struct KittiDataset {
 /// 2011-09-26 UTC, the day of KITTI's first drive, since ROS takes a time of 0 for "unknown".
 ///
 /// @param benchmark_rate  Frames of a STEREO_BENCHMARK per second, > 0.
-/// @param incomplete      If given, the frames of a STEREO_BENCHMARK that lack a file are left out, and what
-/// is
-///                        missing is told here; without it the first one throws.
+/// @param incomplete  If given, the frames of a STEREO_BENCHMARK that lack a file are told here and left out;
+///                    without it the first one throws.
 /// Throws std::runtime_error that names the file and what was expected if one is missing or does not fit to
 /// the others, std::invalid_argument for a bad rate.
 KittiDataset openKittiDataset(const std::string& folder, KittiCameras cameras = KittiCameras::GRAY,
-                              double benchmark_rate = 10.0, std::vector<std::string>* incomplete = nullptr);
+                              double benchmark_rate = 10.0,
+                              std::vector<IncompleteKittiFrame>* incomplete = nullptr);
+
+/// Lists the ground truth of a stereo benchmark folder alone, for maps that were made elsewhere: the frames
+/// of disp_noc and disp_occ, without images and projections. `incomplete` as above: frames that are in one of
+/// them only. Throws std::runtime_error that names the folder if there is neither.
+std::vector<KittiFrame> listGroundTruth(const std::string& folder,
+                                        std::vector<IncompleteKittiFrame>* incomplete = nullptr);
 
 }  // namespace disparity_refinement

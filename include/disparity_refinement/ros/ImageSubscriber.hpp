@@ -7,9 +7,14 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 
 namespace disparity_refinement {
+
+/// To be held while image_transport loads plugins: it makes an ImageTransport, advertises, or subscribes by
+/// another transport than "raw".
+std::mutex& imageTransportMutex();
 
 /// Subscription to an image topic by the transport that ~image_transport names, "raw" by default.
 ///

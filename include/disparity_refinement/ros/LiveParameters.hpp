@@ -4,6 +4,8 @@
 #include <ros/ros.h>
 
 #include <boost/thread/recursive_mutex.hpp>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -26,6 +28,18 @@ SegmentationParameters toParameters(SegmentationConfig& config);
 PlaneRefinementParameters toParameters(PlaneRefinementConfig& config);
 VisualizationConfig toParameters(VisualizationConfig& config);
 
+/// NaN passes every clamp: it becomes the default value.
+template <class Config>
+void replaceNan(Config& config) {
+  dynamic_reconfigure::Config values, defaults;
+  config.__toMessage__(values);
+  Config::__getDefault__().__toMessage__(defaults);
+  for (std::size_t i = 0; i < values.doubles.size(); ++i) {
+    if (std::isnan(values.doubles[i].value)) values.doubles[i].value = defaults.doubles[i].value;
+  }
+  config.__fromMessage__(values);
+}
+
 /// Warns about every start value on the parameter server that is not the one in force: out of range, or of
 /// another type.
 void warnAboutRefusedValues(const ros::NodeHandle& private_nh, const dynamic_reconfigure::Config& in_force);
@@ -41,6 +55,7 @@ class LiveParameters {
     Config start = Config::__getDefault__();
     start.__fromServer__(private_nh);
     start.__clamp__();
+    replaceNan(start);
     toParameters(start);
     dynamic_reconfigure::Config in_force;
     start.__toMessage__(in_force);
@@ -50,6 +65,7 @@ class LiveParameters {
     // Calls back at once.
     server_->setCallback([this](Config& config, std::uint32_t) {
       const std::lock_guard<std::mutex> lock(mutex_);
+      replaceNan(config);
       parameters_ = toParameters(config);
     });
   }

@@ -19,8 +19,8 @@ struct RefinementPicture {
 };
 
 /// The paper's Figures 6 and 7 for one frame as one labelled picture, CV_8UC3: left image and segments;
-/// disparity and refined disparity in one colour scale, with their densities; with a ground truth their
-/// errors too, with the share of pixels wrong by more than 3 px ("all" of KITTI's metric). Throws
+/// disparity and refined disparity in one colour scale, with the share of valid pixels; with a ground truth
+/// their errors too, with the share of pixels wrong by more than 3 px ("all" of KITTI's metric). Throws
 /// std::invalid_argument if types or sizes do not fit.
 cv::Mat drawRefinement(const RefinementPicture& frame);
 
