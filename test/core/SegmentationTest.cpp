@@ -105,6 +105,27 @@ TEST(Segmentation, takesALargeImage) {
   EXPECT_EQ(1, segmentation.tree().countSegments(10, 0));
 }
 
+TEST(Segmentation, surfaceHasTheCountsOfTheWatershedAtEveryPoint) {
+  RandomImages images(8);
+  Segmentation segmentation;
+  cv::Mat labels;
+  for (int i = 0; i < 40; ++i) {
+    const cv::Mat gray = images.next();
+    SegmentationParameters parameters = randomParameters(images);
+    segmentation.compute(gray, parameters, labels);
+    const int max_lambda = static_cast<int>(gray.total()) + 1, max_h = i % 4 == 0 ? 255 : 60;
+    const cv::Mat surface = segmentation.tree().countSurface(max_lambda, max_h);
+    for (parameters.lambda = 0; parameters.lambda <= max_lambda; ++parameters.lambda) {
+      for (parameters.h = 0; parameters.h <= max_h; ++parameters.h) {
+        ASSERT_EQ(surface.at<int>(parameters.lambda, parameters.h),
+                  segmentation.compute(gray, parameters, labels))
+            << "lambda " << parameters.lambda << ", h " << parameters.h << " on\n"
+            << gray;
+      }
+    }
+  }
+}
+
 TEST(Segmentation, countsTheLabelsOfAKittiFrame) {
   const char* folder = std::getenv("DISPARITY_REFINEMENT_KITTI");
   if (folder == nullptr) {
