@@ -35,6 +35,17 @@ inline void writeText(const std::filesystem::path& file, const std::string& text
   std::ofstream(file) << text;
 }
 
+/// What the exception says, empty without one.
+template <class Step>
+std::string refusal(const Step& step) {
+  try {
+    step();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "";
+}
+
 /// A gray image of one value.
 inline void writeGray(const std::filesystem::path& file, int value, const cv::Size& size = {64, 48}) {
   std::filesystem::create_directories(file.parent_path());

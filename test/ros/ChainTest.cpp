@@ -254,11 +254,3 @@ TEST_F(Chain, drawsThePicturesThatAreLookedAt) {
 
 }  // namespace
 }  // namespace disparity_refinement
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "chain_test");
-  ros::AsyncSpinner spinner(1);
-  spinner.start();
-  return RUN_ALL_TESTS();
-}

@@ -94,11 +94,3 @@ TEST(ImageSubscriber, refusesATransportThatIsNotInstalled) {
 
 }  // namespace
 }  // namespace disparity_refinement
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "image_subscriber_test");
-  ros::AsyncSpinner spinner(4);
-  spinner.start();
-  return RUN_ALL_TESTS();
-}

@@ -155,11 +155,3 @@ TEST(Downstream, stockPointCloudKeepsTheFarthestSurfaceOfAMapWithoutHoles) {
 
 }  // namespace
 }  // namespace disparity_refinement
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "stock_test");
-  ros::AsyncSpinner spinner(2);
-  spinner.start();
-  return RUN_ALL_TESTS();
-}

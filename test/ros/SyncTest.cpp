@@ -253,11 +253,3 @@ TEST(Overload, dropsAndCountsTheOldestFrames) {
 
 }  // namespace
 }  // namespace disparity_refinement
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "sync_test");
-  ros::AsyncSpinner spinner(2);
-  spinner.start();
-  return RUN_ALL_TESTS();
-}

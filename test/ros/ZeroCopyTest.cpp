@@ -105,11 +105,3 @@ TEST(ZeroCopy, everyEdgePassesThePointer) {
 
 }  // namespace
 }  // namespace disparity_refinement
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "zero_copy_test");
-  ros::AsyncSpinner spinner(2);
-  spinner.start();
-  return RUN_ALL_TESTS();
-}

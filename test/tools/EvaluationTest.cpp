@@ -87,16 +87,6 @@ void expectEqual(const EvaluationFigures& a, const EvaluationFigures& b) {
   }
 }
 
-template <class Step>
-std::string refusal(const Step& step) {
-  try {
-    step();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "";
-}
-
 TEST(Evaluation, refinementFillsHoles) {
   const Evaluation evaluation = evaluateFolder(streetFolder(), matcherAndRefinement());
   ASSERT_EQ(evaluation.frames.size(), static_cast<std::size_t>(FRAMES));

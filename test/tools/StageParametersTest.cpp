@@ -9,17 +9,6 @@
 namespace disparity_refinement {
 namespace {
 
-/// What the exception says, empty without one.
-template <class Step>
-std::string refusal(const Step& step) {
-  try {
-    step();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "";
-}
-
 TEST(StageParameters, startsWithTheDefaultsOfTheCore) {
   const StageParameters parameters;
   EXPECT_EQ(parameters.matching().correlation_window_size, MatchingParameters().correlation_window_size);
