@@ -71,7 +71,7 @@ class FrameEvaluator {
   FrameEvaluator(const std::vector<EvaluatedMethod>& methods, const EvaluationOptions& options)
       : methods_(methods), options_(options) {
     with_images_ = std::any_of(methods.begin(), methods.end(),
-                               [](const EvaluatedMethod& method) { return method.maps.empty(); });
+                               [](const EvaluatedMethod& method) { return method.isComputed(); });
   }
 
   /// One entry a method.
@@ -86,11 +86,14 @@ class FrameEvaluator {
  private:
   EvaluationFigures evaluate(const LoadedFrame& frame, const EvaluatedMethod& method) {
     EvaluationFigures figures;
-    if (method.maps.empty()) {
+    if (method.isComputed()) {
       match(frame, method.parameters);
       figures.ms.matching = matching_ms_;
-      map_ = roundToKittiPng(disparity_, matcher_.range(frame.geometry.principal_point_offset));
-      if (method.is_refined) refine(frame, method, figures);
+      if (method.isRefined()) {
+        refine(frame, method, figures);
+      } else {
+        map_ = roundToKittiPng(disparity_, matcher_.range(frame.geometry.principal_point_offset));
+      }
     } else {
       const std::string file = (fs::path(method.maps) / (frame.name + ".png")).string();
       map_ = readDisparityPng(file);
@@ -177,12 +180,12 @@ void validate(const std::vector<EvaluatedMethod>& methods, const EvaluationOptio
     if (!folders.insert(folderName(method.name)).second) {
       throw std::invalid_argument("two methods are called " + method.name);
     }
-    if (!method.maps.empty()) {
+    if (!method.isComputed()) {
       if (!fs::is_directory(method.maps)) throw std::runtime_error(method.maps + ": no such folder of maps");
       continue;
     }
     method.parameters.matching();
-    if (!method.is_refined) continue;
+    if (!method.isRefined()) continue;
     method.parameters.segmentation();
     method.parameters.refinement();
   }
@@ -191,7 +194,7 @@ void validate(const std::vector<EvaluatedMethod>& methods, const EvaluationOptio
 void makeFolders(const std::string& folder, const std::vector<EvaluatedMethod>& methods, bool only_refined) {
   if (folder.empty()) return;
   for (const EvaluatedMethod& method : methods) {
-    if (only_refined && (!method.is_refined || !method.maps.empty())) continue;
+    if (only_refined && !method.isRefined()) continue;
     const fs::path path = fs::path(folder) / folderName(method.name);
     std::error_code error;
     fs::create_directories(path, error);

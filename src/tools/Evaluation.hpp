@@ -18,6 +18,9 @@ struct EvaluatedMethod {
   std::string maps;            ///< Folder with FRAME.png, KITTI's 16-bit PNG; empty: the maps are computed.
   StageParameters parameters;  ///< Of a computed method.
   bool is_refined = true;  ///< Of a computed method: with segmentation and refinement, or the matcher alone.
+
+  bool isComputed() const { return maps.empty(); }
+  bool isRefined() const { return isComputed() && is_refined; }
 };
 
 /// Time of the stages [ms].

@@ -1,23 +1,16 @@
 #include "EvaluationReport.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <ostream>
 
+#include "Format.hpp"
 #include "OutputFiles.hpp"
 
 namespace disparity_refinement {
 namespace {
 
 using Json = nlohmann::json;
-
-template <class... Arguments>
-std::string format(const char* pattern, Arguments... arguments) {
-  char text[128];
-  std::snprintf(text, sizeof text, pattern, arguments...);
-  return text;
-}
 
 std::string padded(const std::string& text, std::size_t width) {
   return text + std::string(width - std::min(width, text.size()), ' ');
@@ -28,10 +21,6 @@ std::string cells(const DisparityErrors& errors) {
   for (const double outliers : errors.outliers) text += format(" %6.2f", 100.0 * outliers);
   return text + format(" %6.3f", errors.end_point_error);
 }
-
-bool isComputed(const EvaluatedMethod& method) { return method.maps.empty(); }
-
-bool hasSegments(const EvaluatedMethod& method) { return isComputed(method) && method.is_refined; }
 
 Json toJson(const DisparityErrors& errors) {
   Json json;
@@ -44,9 +33,9 @@ Json toJson(const DisparityErrors& errors) {
 
 Json parametersOf(const EvaluatedMethod& method) {
   Json json = Json::object();
-  if (!isComputed(method)) return json;
+  if (!method.isComputed()) return json;
   const StageParameters& parameters = method.parameters;
-  for (const auto& [name, value] : method.is_refined ? parameters.values() : parameters.matchingValues()) {
+  for (const auto& [name, value] : method.isRefined() ? parameters.values() : parameters.matchingValues()) {
     std::visit([&json, &name = name](auto v) { json[name] = v; }, value);
   }
   return json;
@@ -57,8 +46,8 @@ Json toJson(const EvaluatedMethod& method, const EvaluationFigures& mean, std::s
   json["name"] = method.name;
   json["frames"] = frames;
   json["parameters"] = parametersOf(method);
-  json["segments"] = hasSegments(method) ? Json(mean.segments) : Json();
-  const auto time = [&method](double ms) { return isComputed(method) ? Json(ms) : Json(); };
+  json["segments"] = method.isRefined() ? Json(mean.segments) : Json();
+  const auto time = [&method](double ms) { return method.isComputed() ? Json(ms) : Json(); };
   json["ms"] = {{"matching", time(mean.ms.matching)},
                 {"segmentation", time(mean.ms.segmentation)},
                 {"refinement", time(mean.ms.refinement)},
@@ -85,10 +74,10 @@ std::string csvLines(const EvaluatedMethod& method, const std::string& frame,
       for (const double outliers : errors.outliers) text += format(",%.6f", 100.0 * outliers);
       text += format(",%.6f", errors.end_point_error);
     }
-    text += hasSegments(method) ? format(",%.2f", figures.segments) : ",";
-    text += isComputed(method) ? format(",%.3f,%.3f,%.3f,%.3f", figures.ms.matching, figures.ms.segmentation,
-                                        figures.ms.refinement, figures.ms.total())
-                               : ",,,,";
+    text += method.isRefined() ? format(",%.2f", figures.segments) : ",";
+    text += method.isComputed() ? format(",%.3f,%.3f,%.3f,%.3f", figures.ms.matching, figures.ms.segmentation,
+                                         figures.ms.refinement, figures.ms.total())
+                                : ",,,,";
     text += "\n";
   }
   return text;
@@ -124,9 +113,9 @@ void printTables(const Evaluation& evaluation, std::ostream& out) {
   for (std::size_t m = 0; m < means.size(); ++m) {
     const EvaluatedMethod& method = evaluation.methods[m];
     const StageTimes& ms = means[m].ms;
-    if (!isComputed(method)) continue;
+    if (!method.isComputed()) continue;
     out << padded(method.name, width)
-        << (hasSegments(method) ? format("  %8.1f", means[m].segments) : format("  %8s", "-"))
+        << (method.isRefined() ? format("  %8.1f", means[m].segments) : format("  %8s", "-"))
         << format("  %13.1f  %12.1f  %10.1f  %7.1f\n", ms.matching, ms.segmentation, ms.refinement,
                   ms.total());
   }

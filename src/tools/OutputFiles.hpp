@@ -7,6 +7,7 @@ namespace disparity_refinement {
 
 // All of these throw std::runtime_error "cannot write <file>".
 
+/// The bytes as they are.
 void writeTextFile(const std::string& file, const std::string& text);
 
 /// In the format that the ending of the file's name says.

@@ -3,9 +3,9 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
-#include <stdexcept>
+#include <sstream>
 
+#include "OutputFiles.hpp"
 #include "disparity_refinement/arguments.hpp"
 
 namespace disparity_refinement {
@@ -50,13 +50,12 @@ int writePly(const std::string& file, const cv::Mat& disparity, const DisparityR
       ++count;
     }
   }
-  std::ofstream stream(file, std::ios::binary);
-  stream << "ply\nformat " << byteOrder() << " 1.0\nelement vertex " << count
-         << "\nproperty float x\nproperty float y\nproperty float z\n"
-            "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
-         << vertices;
-  stream.close();
-  if (!stream) throw std::runtime_error("cannot write " + file);
+  std::ostringstream text;
+  text << "ply\nformat " << byteOrder() << " 1.0\nelement vertex " << count
+       << "\nproperty float x\nproperty float y\nproperty float z\n"
+          "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
+       << vertices;
+  writeTextFile(file, text.str());
   return count;
 }
 

@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "Format.hpp"
 #include "disparity_refinement/evaluation/KittiMetric.hpp"
 #include "disparity_refinement/ros/Messages.hpp"
 #include "disparity_refinement/visualization/RefinementPicture.hpp"
@@ -26,13 +27,6 @@ namespace {
 
 using Disparity = stereo_msgs::DisparityImage;
 using Image = sensor_msgs::Image;
-
-template <class... Arguments>
-std::string format(const char* pattern, Arguments... arguments) {
-  char text[256];
-  std::snprintf(text, sizeof text, pattern, arguments...);
-  return text;
-}
 
 /// Figures of one kind of disparity map, raw or refined.
 class MapFigures {
