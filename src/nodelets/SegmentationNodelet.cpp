@@ -41,6 +41,13 @@ class SegmentationNodelet : public LazyNodelet {
     });
     parameters_ = std::make_unique<LiveParameters<SegmentationConfig>>(private_nh);
     queue_size_ = std::max(1, private_nh.param("queue_size", 5));
+    const int asked = private_nh.param("segmentation_threads", 1);
+    const int threads = std::clamp(asked, 1, FilteredWatershed::MAX_STRIPS);
+    if (threads != asked) {
+      NODELET_WARN_STREAM(private_nh.resolveName("segmentation_threads")
+                          << " is " << asked << ", which is out of range: using " << threads);
+    }
+    segmentation_ = std::make_unique<Segmentation>(threads);
     worker_ = std::make_unique<FrameWorker<sensor_msgs::ImageConstPtr>>(
         queue_size_, *monitor_, [this](const sensor_msgs::ImageConstPtr& image) { process(image); });
     publisher_ = advertise<sensor_msgs::Image>(nh, "labels");
@@ -67,7 +74,7 @@ class SegmentationNodelet : public LazyNodelet {
     const auto message =
         makeImage(image->header, gray->image.size(), sensor_msgs::image_encodings::TYPE_32SC1);
     cv::Mat labels = imageView(*message, sensor_msgs::image_encodings::TYPE_32SC1, "labels");
-    segments_ = segmentation_.compute(gray->image, parameters, labels);
+    segments_ = segmentation_->compute(gray->image, parameters, labels);
     ROS_DEBUG_STREAM("[" << getName() << "] " << segments_ << " segments (lambda " << parameters.lambda
                          << " px, h " << parameters.h << ")");
     monitor_->published(message->header.stamp, (ros::WallTime::now() - begin).toSec() * 1e3);
@@ -77,7 +84,7 @@ class SegmentationNodelet : public LazyNodelet {
 
   std::unique_ptr<StageMonitor> monitor_;
   std::unique_ptr<LiveParameters<SegmentationConfig>> parameters_;
-  Segmentation segmentation_;
+  std::unique_ptr<Segmentation> segmentation_;
   std::atomic<int> segments_{0};
   int queue_size_ = 5;
   ros::Publisher publisher_;

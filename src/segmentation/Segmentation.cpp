@@ -1,5 +1,7 @@
 #include "disparity_refinement/segmentation/Segmentation.hpp"
 
+#include "disparity_refinement/arguments.hpp"
+
 namespace disparity_refinement {
 
 void validate(const SegmentationParameters& parameters) {
@@ -8,12 +10,23 @@ void validate(const SegmentationParameters& parameters) {
   validate(parameters.gradient);
 }
 
+Segmentation::Segmentation(int strips) : strips_(strips), watershed_(strips) {}
+
 int Segmentation::compute(const cv::Mat& gray, const SegmentationParameters& parameters, cv::Mat& labels) {
+  computeGradient(gray, parameters);
+  return watershed_.compute(parameters.lambda, parameters.h, parameters.connectivity, labels);
+}
+
+cv::Mat Segmentation::countSurface(const cv::Mat& gray, const SegmentationParameters& parameters,
+                                   int max_lambda, int max_h) {
+  computeGradient(gray, parameters);
+  return watershed_.countSurface(max_lambda, max_h, parameters.connectivity);
+}
+
+void Segmentation::computeGradient(const cv::Mat& gray, const SegmentationParameters& parameters) {
   validate(parameters);
-  gradient_.compute(gray, parameters.gradient, gradient_image_);
-  tree_.build(gradient_image_, parameters.connectivity);
-  tree_.filter(parameters.lambda, parameters.h, filtered_);
-  return watershed_.compute(filtered_, parameters.connectivity, labels);
+  requireImage(gray, "gray", CV_8UC1);
+  gradient_.compute(gray, parameters.gradient, watershed_.image(gray.size()), strips_);
 }
 
 }  // namespace disparity_refinement

@@ -29,7 +29,7 @@ constexpr const char* USAGE =
     R"(Usage: influence_surface IMAGE [options]
 
 Counts the segments of an image for lambda = 0 ... 160 and h = 0 ... 60, all of them from
-one min-tree, and writes
+one tree, and writes
   surface.csv    lambda, h, segments
   surface.png    the surface in 3-D, with the paper's three settings marked (by gnuplot)
   segments.png   the segmentations of the three settings
@@ -162,8 +162,7 @@ void run(int argc, char** argv) {
     segmentation_parameters.h = mark.h;
     mark.segments = segmentation.compute(gray, segmentation_parameters, mark.labels);
   }
-  // The tree is that of the gradient: the same for every lambda and h.
-  const cv::Mat surface = segmentation.tree().countSurface(max_lambda, max_h);
+  const cv::Mat surface = segmentation.countSurface(gray, segmentation_parameters, max_lambda, max_h);
 
   fs::create_directories(folder);
   const auto file = [&folder](const char* name) { return (fs::path(folder) / name).string(); };

@@ -48,7 +48,6 @@ TEST(Segmentation, runsItsStagesInTheirOrder) {
     ASSERT_TRUE(identical(filtered, segmentation.filtered())) << gray;
     ASSERT_TRUE(identical(expected.labels, labels)) << gray;
     ASSERT_EQ(expected.count, count) << gray;
-    ASSERT_EQ(count, segmentation.tree().countSegments(parameters.lambda, parameters.h)) << gray;
   }
 }
 
@@ -101,8 +100,10 @@ TEST(Segmentation, takesALargeImage) {
   EXPECT_EQ(1024 * 750, segmentation.compute(board, parameters, labels));
   EXPECT_EQ(1024 * 750 - 1, labels.at<int>(size.height - 1, size.width - 1));
   // At the corners of the image a field has 3x3 pixels inside.
-  EXPECT_EQ(4, segmentation.tree().countSegments(9, 0));
-  EXPECT_EQ(1, segmentation.tree().countSegments(10, 0));
+  parameters.lambda = 9;
+  EXPECT_EQ(4, segmentation.compute(board, parameters, labels));
+  parameters.lambda = 10;
+  EXPECT_EQ(1, segmentation.compute(board, parameters, labels));
 }
 
 TEST(Segmentation, surfaceHasTheCountsOfTheWatershedAtEveryPoint) {
@@ -114,7 +115,7 @@ TEST(Segmentation, surfaceHasTheCountsOfTheWatershedAtEveryPoint) {
     SegmentationParameters parameters = randomParameters(images);
     segmentation.compute(gray, parameters, labels);
     const int max_lambda = static_cast<int>(gray.total()) + 1, max_h = i % 4 == 0 ? 255 : 60;
-    const cv::Mat surface = segmentation.tree().countSurface(max_lambda, max_h);
+    const cv::Mat surface = segmentation.countSurface(gray, parameters, max_lambda, max_h);
     for (parameters.lambda = 0; parameters.lambda <= max_lambda; ++parameters.lambda) {
       for (parameters.h = 0; parameters.h <= max_h; ++parameters.h) {
         ASSERT_EQ(surface.at<int>(parameters.lambda, parameters.h),
@@ -148,7 +149,7 @@ TEST(Segmentation, countsTheLabelsOfAKittiFrame) {
       double largest = 0.0;
       cv::minMaxLoc(labels, nullptr, &largest);
       EXPECT_EQ(count - 1, static_cast<int>(largest));
-      EXPECT_EQ(count, segmentation.tree().countSegments(lambda, h));
+      EXPECT_EQ(count, segmentation.countSurface(gray, parameters, lambda, h).at<int>(lambda, h));
       EXPECT_LT(count, former);
       former = count;
     }

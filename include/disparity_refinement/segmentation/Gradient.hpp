@@ -1,6 +1,9 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <opencv2/core.hpp>
+#include <vector>
 
 namespace disparity_refinement {
 
@@ -23,14 +26,30 @@ void validate(const GradientParameters& parameters);
 
 /// g(p) = max - min of the gray values under the structuring element; pixels outside the image are ignored.
 /// In the shadow g becomes round(255^(1 - gamma) * g^gamma).
+///
+/// Buffers are kept between images; one object serves one thread at a time.
 class Gradient {
  public:
   /// @param gray      CV_8UC1, not empty.
-  /// @param gradient  CV_8UC1 of the same size.
-  void compute(const cv::Mat& gray, const GradientParameters& parameters, cv::Mat& gradient);
+  /// @param gradient  CV_8UC1 of the same size; written in place if it has that type and size already.
+  /// @param strips    The rows are worked on in this number of strips, >= 1, side by side if OpenCV has the
+  ///                  threads.
+  void compute(const cv::Mat& gray, const GradientParameters& parameters, cv::Mat& gradient, int strips = 1);
 
  private:
-  cv::Mat dilated_, eroded_;
+  using Table = std::array<std::uint8_t, 256>;
+  /// A row of pixels with a margin on both sides.
+  using Line = std::vector<std::uint8_t>;
+  struct Lines {
+    Line own, highest, lowest;
+  };
+
+  void computeRows(const cv::Mat& gray, const GradientParameters& parameters, cv::Range rows, Lines& lines,
+                   cv::Mat& gradient) const;
+
+  std::vector<Lines> lines_;  // Of every strip.
+  Table shadow_table_{};
+  double shadow_table_gamma_ = 0.0;
 };
 
 }  // namespace disparity_refinement

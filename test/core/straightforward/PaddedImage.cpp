@@ -1,4 +1,4 @@
-#include "disparity_refinement/segmentation/PaddedImage.hpp"
+#include "straightforward/PaddedImage.hpp"
 
 #include <cstdint>
 #include <limits>
@@ -6,6 +6,7 @@
 #include "disparity_refinement/arguments.hpp"
 
 namespace disparity_refinement {
+namespace straightforward {
 
 void PaddedImage::assign(const cv::Mat& image) {
   requireImage(image, "image", CV_8UC1);
@@ -26,4 +27,5 @@ std::array<int, 8> PaddedImage::neighbours() const {
   return {-1, 1, -s, s, -s - 1, -s + 1, s - 1, s + 1};
 }
 
+}  // namespace straightforward
 }  // namespace disparity_refinement

@@ -7,12 +7,12 @@
 #include <vector>
 
 #include "disparity_refinement/segmentation/Connectivity.hpp"
-#include "disparity_refinement/segmentation/PaddedImage.hpp"
+#include "straightforward/PaddedImage.hpp"
 
 namespace disparity_refinement {
+namespace straightforward {
 
 /// Throws std::invalid_argument unless lambda >= 0 and 0 <= h <= 255.
-void validateFilter(int lambda, int h);
 
 /// Min-tree of an 8-bit image: one node for every connected component of every lower level set {f <= t} in
 /// which a pixel of value t lies; its parent is the next larger component that holds it.
@@ -115,4 +115,5 @@ class MinTree {
   std::vector<std::int32_t> node_of_cell_;  ///< The smallest component that holds a pixel.
 };
 
+}  // namespace straightforward
 }  // namespace disparity_refinement

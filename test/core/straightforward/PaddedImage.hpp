@@ -7,6 +7,7 @@
 #include "disparity_refinement/segmentation/Connectivity.hpp"
 
 namespace disparity_refinement {
+namespace straightforward {
 
 /// A gray image in 16-bit cells, inside a frame one cell wide: every pixel has all its neighbours, so that no
 /// bounds need be checked. The frame is higher than any gray value, 255 too: it is neither lower than a pixel
@@ -36,4 +37,5 @@ class PaddedImage {
   cv::Mat cells_;
 };
 
+}  // namespace straightforward
 }  // namespace disparity_refinement

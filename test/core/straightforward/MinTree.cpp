@@ -1,17 +1,14 @@
-#include "disparity_refinement/segmentation/MinTree.hpp"
+#include "straightforward/MinTree.hpp"
 
 #include <algorithm>
 #include <limits>
 #include <numeric>
 
 #include "disparity_refinement/arguments.hpp"
+#include "disparity_refinement/segmentation/BasinFilter.hpp"
 
 namespace disparity_refinement {
-
-void validateFilter(int lambda, int h) {
-  requireArgument(lambda >= 0, "lambda", lambda, "at least 0");
-  requireArgument(h >= 0 && h <= 255, "h", h, "0...255");
-}
+namespace straightforward {
 
 void MinTree::Front::reset(int cells) {
   top_.fill(BOTTOM);
@@ -211,4 +208,5 @@ cv::Mat MinTree::countSurface(int max_lambda, int max_h) const {
   return counts;
 }
 
+}  // namespace straightforward
 }  // namespace disparity_refinement

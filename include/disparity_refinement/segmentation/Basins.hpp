@@ -1,0 +1,102 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "disparity_refinement/segmentation/CellGrid.hpp"
+#include "disparity_refinement/segmentation/Connectivity.hpp"
+#include "disparity_refinement/segmentation/PointerForest.hpp"
+
+namespace disparity_refinement {
+
+/// What the stages of the segmentation write into every cell, one stage after the other.
+struct CellBuffers {
+  std::vector<std::uint8_t> codes;
+  std::vector<std::int32_t> ids;
+  PointerForest forest;
+};
+
+/// Splits an 8-bit image f into basins, which is all that its lower components consist of.
+///
+/// A pixel is lower than another by (value, raster index), so that plateaus need no care. Every pixel with a
+/// lower neighbour points to one; a basin is the set of pixels whose paths end in the same one. The component
+/// of {f <= t} that holds a pixel p of value <= t is then the union of
+///
+///   - the pixels of value <= t of the basins that hang together through saddles of level <= t.
+///
+/// A saddle is a pixel whose lower neighbours do not hang together in the ring of its eight neighbours: only
+/// there can components meet. These critical pixels, about a tenth of all, are found by Yokoi's number
+/// (Yokoi, Toriwaki and Fukumura 1975).
+///
+/// Level 255 is left out: there every image is one component. Pixels of 255 without a lower neighbour make
+/// one basin, SUMMIT.
+class Basins {
+ public:
+  static constexpr int LEVELS = 256;
+  static constexpr std::uint8_t SUMMIT_LEVEL = 255;
+  static constexpr std::int32_t SUMMIT = 0;
+
+  struct Saddle {
+    std::int32_t a, b;  ///< The two basins that meet.
+  };
+
+  /// @param image    All cells of the grid; 255 in its frame.
+  /// @param buffers  ids will hold the basin of every cell and forest.values() that of every node.
+  void build(const CellGrid& grid, const std::uint8_t* image, Connectivity connectivity, int strips,
+             CellBuffers& buffers);
+
+  /// Number of basins, SUMMIT among them.
+  int size() const { return size_; }
+
+  /// Calls visit(pixels), where pixels[i] is the basin of the i-th pixel by level: 16-bit numbers if that is
+  /// enough, as there are many.
+  template <typename Visitor>
+  auto visitPixels(const Visitor& visit) const {
+    return isSmall() ? visit(small_pixels_.data()) : visit(pixels_.data());
+  }
+  /// The pixels of a level below SUMMIT_LEVEL.
+  cv::Range pixelsOf(int level) const { return {pixel_begin_[level], pixel_begin_[level + 1]}; }
+
+  const Saddle* saddles() const { return saddles_.data(); }
+  /// The saddles of a level below SUMMIT_LEVEL.
+  cv::Range saddlesOf(int level) const { return {saddle_begin_[level], saddle_begin_[level + 1]}; }
+
+ private:
+  using Histogram = std::array<std::int32_t, LEVELS>;
+  struct LeveledSaddle {
+    Saddle saddle;
+    std::int32_t level;
+  };
+  /// What a strip adds to the counting sorts: first how many there are of every level, then where the next
+  /// one goes. The pixels of even and of odd cells are counted apart, for neighbours often share a level, and
+  /// two increments of one number would have to wait for each other.
+  struct Strip {
+    cv::Range cells;
+    Histogram even_pixels, odd_pixels, saddle_counts;
+    std::vector<LeveledSaddle> saddles;
+    int saddle_count = 0;
+  };
+
+  bool isSmall() const { return size_ <= 1 << 16; }
+  template <int neighbour_count>
+  void findLowerNeighbours(cv::Range cells, std::uint8_t* lower);
+  void countPixels(Strip& strip);
+  template <typename Index>
+  void sortPixels(Strip& strip, const std::int32_t* basin_of_node, std::int32_t* ids, Index* pixels);
+  void findSaddles(Strip& strip, const CellBuffers& buffers);
+  void sortSaddles(const Strip& strip, Histogram next);
+
+  CellGrid grid_;
+  const std::uint8_t* image_ = nullptr;
+  Connectivity connectivity_ = Connectivity::EIGHT;
+  std::vector<Strip> strips_;
+  std::vector<std::uint32_t> critical_;  // A bit for every cell of a block.
+  std::vector<std::uint16_t> small_pixels_;
+  std::vector<std::int32_t> pixels_;
+  std::vector<Saddle> saddles_;
+  std::array<int, LEVELS + 1> pixel_begin_{}, saddle_begin_{};
+  int size_ = 0;
+};
+
+}  // namespace disparity_refinement

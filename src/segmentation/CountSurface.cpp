@@ -1,0 +1,95 @@
+#include "disparity_refinement/segmentation/CountSurface.hpp"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "disparity_refinement/arguments.hpp"
+#include "disparity_refinement/segmentation/buffers.hpp"
+
+namespace disparity_refinement {
+
+void validateSurface(int max_lambda, int max_h) {
+  requireArgument(max_lambda >= 0, "max_lambda", max_lambda, "at least 0");
+  requireArgument(max_h >= 0 && max_h <= 255, "max_h", max_h, "0...255");
+}
+
+cv::Mat CountSurface::compute(const Basins& basins, int pixels, int max_lambda, int max_h) {
+  validateSurface(max_lambda, max_h);
+  // Only the whole image reaches an area of `pixels` or more.
+  largest_area_ = std::min(std::max(max_lambda, 1), pixels);
+
+  const std::size_t size = basins.size();
+  for (auto* buffer : {&set_of_, &next_in_set_, &sizes_, &areas_}) growTo(*buffer, size);
+  growTo(levels_, size * largest_area_);
+  std::iota(set_of_.begin(), set_of_.begin() + size, 0);
+  std::iota(next_in_set_.begin(), next_in_set_.begin() + size, 0);
+  std::fill_n(sizes_.begin(), size, 1);
+  std::fill_n(areas_.begin(), size, 0);
+  growTo(depths_, largest_area_);
+  for (int a = 0; a < largest_area_; ++a) depths_[a].fill(0);
+  basins.visitPixels([&](const auto* of_pixel) { merge(basins, of_pixel); });
+
+  cv::Mat counts(max_lambda + 1, max_h + 1, CV_32SC1);
+  for (int lambda = 0; lambda <= max_lambda; ++lambda) {
+    const auto& minima = depths_[std::min(std::max(lambda, 1), largest_area_) - 1];
+    int deeper = std::accumulate(minima.begin(), minima.end(), 0);
+    for (int h = 0; h <= max_h; ++h) {
+      deeper -= minima[h];
+      counts.at<int>(lambda, h) = 1 + deeper;
+    }
+  }
+  return counts;
+}
+
+template <typename Index>
+void CountSurface::merge(const Basins& basins, const Index* pixels) {
+  for (int level = 0; level < Basins::SUMMIT_LEVEL; ++level) {
+    const cv::Range own_pixels = basins.pixelsOf(level);
+    for (int i = own_pixels.start; i < own_pixels.end; ++i) {
+      const std::int32_t set = set_of_[pixels[i]];
+      const std::int32_t area = ++areas_[set];
+      if (area <= largest_area_) levelsOf(set)[area] = static_cast<std::uint8_t>(level);
+    }
+    const cv::Range saddles = basins.saddlesOf(level);
+    for (int i = saddles.start; i < saddles.end; ++i) {
+      const std::int32_t a = set_of_[basins.saddles()[i].a], b = set_of_[basins.saddles()[i].b];
+      if (a != b) unite(a, b, level);
+    }
+  }
+  // At the summit everything meets.
+  for (int basin = 0; basin < basins.size(); ++basin) {
+    const std::int32_t all = set_of_[Basins::SUMMIT], set = set_of_[basin];
+    if (set != all) unite(all, set, Basins::SUMMIT_LEVEL);
+  }
+}
+
+void CountSurface::unite(std::int32_t a, std::int32_t b, int level) {
+  if (sizes_[a] < sizes_[b]) std::swap(a, b);
+  std::int32_t basin = b;
+  do {
+    set_of_[basin] = a;
+    basin = next_in_set_[basin];
+  } while (basin != b);
+  std::swap(next_in_set_[a], next_in_set_[b]);
+  sizes_[a] += sizes_[b];
+
+  std::uint8_t* levels = levelsOf(a);
+  const std::uint8_t* others = levelsOf(b);
+  const std::int32_t known = std::min(areas_[a], largest_area_),
+                     known_of_b = std::min(areas_[b], largest_area_);
+  const std::int32_t common = std::min(known, known_of_b);
+  for (std::int32_t area = 1; area <= common; ++area) {
+    const auto [first, last] = std::minmax(levels[area], others[area]);
+    ++depths_[area - 1][level - last];
+    levels[area] = first;
+  }
+  for (std::int32_t area = known + 1; area <= known_of_b; ++area) levels[area] = others[area];
+  areas_[a] += areas_[b];
+  const std::int32_t reached = std::min(areas_[a], largest_area_);
+  for (std::int32_t area = std::max(known, known_of_b) + 1; area <= reached; ++area) {
+    levels[area] = static_cast<std::uint8_t>(level);
+  }
+}
+
+}  // namespace disparity_refinement
