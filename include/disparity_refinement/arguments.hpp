@@ -7,10 +7,10 @@
 
 namespace disparity_refinement {
 
-/// Throws std::invalid_argument "<name> is <value>, expected <expected>" unless the condition holds.
-template <typename Value>
-void requireArgument(bool condition, const std::string& name, const Value& value,
-                     const std::string& expected) {
+/// Throws std::invalid_argument "<name> is <value>, expected <expected>" unless the condition holds. Nothing
+/// is allocated if it does, as far as the arguments need no allocation themselves.
+template <typename Name, typename Value, typename Expected>
+void requireArgument(bool condition, const Name& name, const Value& value, const Expected& expected) {
   if (condition) return;
   std::ostringstream message;
   message << name << " is " << value << ", expected " << expected;
@@ -23,14 +23,15 @@ inline std::string describeImage(int type, const cv::Size& size) {
 }
 
 /// Throws std::invalid_argument unless the image has this type and size and is not empty.
-inline void requireImage(const cv::Mat& image, const std::string& name, int type, const cv::Size& size) {
+inline void requireImage(const cv::Mat& image, const char* name, int type, const cv::Size& size) {
   const cv::Size actual(image.cols, image.rows);
-  requireArgument(image.dims == 2 && !image.empty() && image.type() == type && actual == size, name,
-                  describeImage(image.type(), actual), describeImage(type, size) + ", not empty");
+  if (image.dims == 2 && !image.empty() && image.type() == type && actual == size) return;
+  requireArgument(false, name, describeImage(image.type(), actual),
+                  describeImage(type, size) + ", not empty");
 }
 
 /// The same for an image of any size.
-inline void requireImage(const cv::Mat& image, const std::string& name, int type) {
+inline void requireImage(const cv::Mat& image, const char* name, int type) {
   requireImage(image, name, type, cv::Size(image.cols, image.rows));
 }
 

@@ -14,7 +14,8 @@ void validateFilter(int lambda, int h) {
   requireArgument(h >= 0 && h <= 255, "h", h, "0...255");
 }
 
-int BasinFilter::run(const Basins& basins, int pixels, int lambda, int h) {
+int BasinFilter::run(const Basins& basins, const CellBuffers& buffers, const std::uint8_t* image, int pixels,
+                     int lambda, int h) {
   validateFilter(lambda, h);
   // The whole image reaches any area, and a component has one pixel at least.
   lambda_ = std::min(std::max(lambda, 1), pixels);
@@ -23,22 +24,25 @@ int BasinFilter::run(const Basins& basins, int pixels, int lambda, int h) {
   const std::size_t size = basins.size();
   growTo(set_of_, size);
   growTo(next_in_set_, size);
-  growTo(sets_, size);
   growTo(areas_, size);
+  growTo(reached_, size);
   growTo(results_, size);
   std::iota(set_of_.begin(), set_of_.begin() + size, 0);
   std::iota(next_in_set_.begin(), next_in_set_.begin() + size, 0);
-  std::fill_n(sets_.begin(), size, Set{1, NEVER});
+  std::fill_n(reached_.begin(), size, NEVER);
   std::fill_n(areas_.begin(), size, 0);
   std::fill_n(results_.begin(), size, Result{NONE, Basins::SUMMIT_LEVEL});
   // Live sets go on to count pixels, but have reached lambda long since.
   areas_[LIVE] = lambda_;
-  candidates_of_.fill(-1);
-  candidates_.clear();
-  growTo(candidates_, 0);
+  growTo(next_candidate_, size);
+  first_candidate_.fill(NO_CANDIDATE);
 
-  const int minima = basins.visitPixels([&](const auto* of_pixel) { return merge(basins, of_pixel); });
-  if (minima > 0) return minima;
+  const int minima =
+      basins.visitPixels(buffers, [&](const auto* of_pixel) { return merge(basins, of_pixel); });
+  if (minima > 0) {
+    numberMinima(basins, buffers, image, minima);
+    return minima;
+  }
   // Only the whole image becomes live, at level 255.
   std::fill_n(results_.begin(), size, Result{0, Basins::SUMMIT_LEVEL});
   return 1;
@@ -56,8 +60,7 @@ int BasinFilter::merge(const Basins& basins, const Index* pixels) {
     for (int i = own_pixels.start; i < own_pixels.end; ++i) {
       const std::int32_t set = set_of[pixels[i]];
       if (++areas[set] != lambda) continue;
-      sets_[set].reached = level;
-      reach(set, level);
+      reachLambda(set, level);
     }
     const cv::Range saddles = basins.saddlesOf(level);
     for (int i = saddles.start; i < saddles.end; ++i) {
@@ -65,10 +68,9 @@ int BasinFilter::merge(const Basins& basins, const Index* pixels) {
       const std::int32_t a = set_of[saddle.a], b = set_of[saddle.b];
       if (a != b) meet(a, b, level);
     }
-    // What is still a set of this name, and meant to be live now, has not met a live one.
-    for (std::int32_t k = candidates_of_[level]; k >= 0; k = candidates_[k].next) {
-      const std::int32_t set = candidates_[k].set;
-      if (set_of_[set] == set && sets_[set].reached + h_ == level) enliven(set, {minima++, level});
+    for (std::int32_t k = first_candidate_[level]; k != NO_CANDIDATE; k = next_candidate_[k]) {
+      const std::int32_t candidate = set_of[k];
+      if (candidate != LIVE && reached_[candidate] + h_ == level) enliven(candidate, {minima++, level});
     }
   }
   return minima;
@@ -79,7 +81,7 @@ void BasinFilter::meet(std::int32_t a, std::int32_t b, int level) {
     enliven(b, {NONE, level});
   } else if (b == LIVE) {
     enliven(a, {NONE, level});
-  } else if (sets_[a].size < sets_[b].size) {
+  } else if (areas_[a] < areas_[b]) {
     unite(b, a, level);
   } else {
     unite(a, b, level);
@@ -94,25 +96,22 @@ void BasinFilter::unite(std::int32_t larger, std::int32_t smaller, int level) {
   } while (basin != smaller);
   std::swap(next_in_set_[larger], next_in_set_[smaller]);  // Two rings become one.
 
-  Set& set = sets_[larger];
-  const Set& other = sets_[smaller];
-  set.size += other.size;
   areas_[larger] += areas_[smaller];
-  if (other.reached < set.reached) {
-    set.reached = other.reached;
-    reach(larger, set.reached);
-  } else if (set.reached == NEVER && areas_[larger] >= lambda_) {
-    set.reached = level;
-    reach(larger, level);
+  if (reached_[smaller] < reached_[larger]) {
+    // The smaller one is a candidate already, and is called `larger` from here on.
+    reached_[larger] = reached_[smaller];
+  } else if (reached_[larger] == NEVER && areas_[larger] >= lambda_) {
+    reachLambda(larger, level);
   }
 }
 
-// Notes that a set will be live h levels above the one where it reached lambda.
-void BasinFilter::reach(std::int32_t set, int reached) {
-  const int level = reached + h_;
-  if (level >= Basins::SUMMIT_LEVEL) return;
-  candidates_.push_back({set, candidates_of_[level]});
-  candidates_of_[level] = static_cast<std::int32_t>(candidates_.size()) - 1;
+// No set of the same name does so a second time, so that one link for each is enough.
+void BasinFilter::reachLambda(std::int32_t set, int level) {
+  reached_[set] = static_cast<std::int16_t>(level);
+  const int live_level = level + h_;
+  if (live_level >= Basins::SUMMIT_LEVEL) return;
+  next_candidate_[set] = first_candidate_[live_level];
+  first_candidate_[live_level] = set;
 }
 
 void BasinFilter::enliven(std::int32_t set, Result result) {
@@ -122,6 +121,24 @@ void BasinFilter::enliven(std::int32_t set, Result result) {
     results_[basin] = result;
     basin = next_in_set_[basin];
   } while (basin != set);
+}
+
+// The first pixel of a minimum in raster order has no earlier neighbour that is as low: it is a start.
+void BasinFilter::numberMinima(const Basins& basins, const CellBuffers& buffers, const std::uint8_t* image,
+                               int count) {
+  std::int32_t* numbers = areas_.data();  // The areas are not needed any more.
+  std::fill_n(numbers, count, NONE);
+  int next = 0;
+  for (int i = 0; i < basins.startCount() && next < count; ++i) {
+    const std::int32_t cell = basins.starts()[i];
+    const Result& result = results_[buffers.ids[cell]];
+    if (result.minimum == NONE || numbers[result.minimum] != NONE) continue;
+    if (image[cell] <= result.level) numbers[result.minimum] = next++;
+  }
+  for (int basin = 0; basin < basins.size(); ++basin) {
+    std::int32_t& minimum = results_[basin].minimum;
+    if (minimum != NONE) minimum = numbers[minimum];
+  }
 }
 
 }  // namespace disparity_refinement

@@ -87,9 +87,10 @@ void Basins::build(const CellGrid& grid, const std::uint8_t* image, Connectivity
   connectivity_ = connectivity;
   strips_.resize(strips);
   for (int i = 0; i < strips; ++i) strips_[i].cells = grid.strip(i, strips);
-  growTo(critical_, grid.blocks());
-  growTo(buffers.codes, grid.capacity());
-  growTo(buffers.ids, grid.capacity());
+  // Of the same size for all images of a size: no room for more is needed.
+  critical_.resize(grid.blocks());
+  buffers.codes.resize(grid.capacity());
+  buffers.ids.resize(grid.capacity());
 
   const bool four = connectivity == Connectivity::FOUR;
   std::uint8_t* lower = buffers.codes.data();
@@ -110,6 +111,9 @@ void Basins::build(const CellGrid& grid, const std::uint8_t* image, Connectivity
   pointers.node_value = 0;
   lower[0] = 0;
   buffers.forest.number(grid, lower, pointers, 0, strips, buffers.ids.data());
+  start_count_ = buffers.forest.size();
+  growTo(starts_, start_count_);
+  for (int i = 0; i < start_count_; ++i) starts_[i] = buffers.forest.cellOf(i);
   size_ = SUMMIT + 1;
   buffers.forest.resolve([&](std::int32_t cell) { return image[cell] == SUMMIT_LEVEL ? SUMMIT : size_++; });
 
@@ -119,27 +123,33 @@ void Basins::build(const CellGrid& grid, const std::uint8_t* image, Connectivity
     for (Strip& strip : strips_) accumulate({&strip.even_pixels[level], &strip.odd_pixels[level]}, begin);
   }
   pixel_begin_[LEVELS] = begin;
-  if (isSmall()) {
-    growTo(small_pixels_, begin);
-  } else {
-    growTo(pixels_, begin);
-  }
+  auto* small_pixels = isSmall() ? buffers.scratch.array<std::uint16_t>(begin) : nullptr;
+  auto* pixels = isSmall() ? nullptr : buffers.scratch.array<std::int32_t>(begin);
   forEachStrip(strips, [&](int i) {
     const std::int32_t* basin_of_node = buffers.forest.values().data();
     std::int32_t* ids = buffers.ids.data();
-    isSmall() ? sortPixels(strips_[i], basin_of_node, ids, small_pixels_.data())
-              : sortPixels(strips_[i], basin_of_node, ids, pixels_.data());
+    isSmall() ? sortPixels(strips_[i], basin_of_node, ids, small_pixels)
+              : sortPixels(strips_[i], basin_of_node, ids, pixels);
   });
 
-  forEachStrip(strips, [&](int i) { findSaddles(strips_[i], buffers); });
+  // To look twice takes less memory than to keep what was seen.
+  forEachStrip(strips, [&](int i) {
+    Histogram& counts = strips_[i].saddles;
+    counts.fill(0);
+    visitSaddles(strips_[i], buffers, [&counts](int level, const Saddle&) { ++counts[level]; });
+  });
   begin = 0;
   for (int level = 0; level < LEVELS; ++level) {
     saddle_begin_[level] = begin;
-    for (Strip& strip : strips_) accumulate({&strip.saddle_counts[level]}, begin);
+    for (Strip& strip : strips_) accumulate({&strip.saddles[level]}, begin);
   }
   saddle_begin_[LEVELS] = begin;
   growTo(saddles_, begin);
-  forEachStrip(strips, [&](int i) { sortSaddles(strips_[i], strips_[i].saddle_counts); });
+  forEachStrip(strips, [&](int i) {
+    Histogram& next = strips_[i].saddles;
+    visitSaddles(strips_[i], buffers,
+                 [&](int level, const Saddle& saddle) { saddles_[next[level]++] = saddle; });
+  });
 }
 
 template <int neighbour_count>
@@ -214,35 +224,23 @@ void Basins::sortPixels(Strip& strip, const std::int32_t* basin_of_node, std::in
   }
 }
 
-void Basins::findSaddles(Strip& strip, const CellBuffers& buffers) {
+template <typename Visitor>
+void Basins::visitSaddles(const Strip& strip, const CellBuffers& buffers, const Visitor& visit) const {
   const LowerSets& lower_sets = lowerSets(connectivity_);
   const std::array<int, 8> neighbours = grid_.neighbours();
   const std::uint8_t* lower = buffers.codes.data();
   const std::int32_t* basin_of = buffers.ids.data();
-  strip.saddle_counts.fill(0);
-  int count = 0;
   for (int block = strip.cells.start; block < strip.cells.end; block += CellGrid::BLOCK) {
-    growTo(strip.saddles, count + 3 * CellGrid::BLOCK);
-    for (std::uint32_t bits = critical_[(block - grid_.begin()) / CellGrid::BLOCK]; bits != 0;
-         bits &= bits - 1) {
-      const int p = block + __builtin_ctz(bits);
+    std::uint32_t critical = critical_[(block - grid_.begin()) / CellGrid::BLOCK];
+    for (; critical != 0; critical &= critical - 1) {
+      const int p = block + __builtin_ctz(critical);
       const LowerSet& set = lower_sets[lower[p]];
       const std::int32_t a = basin_of[p + neighbours[set.members[0]]];
       for (int i = 1; i < set.parts; ++i) {
         const std::int32_t b = basin_of[p + neighbours[set.members[i]]];
-        strip.saddles[count] = {{a, b}, image_[p]};
-        const int is_saddle = a != b ? 1 : 0;
-        count += is_saddle;
-        strip.saddle_counts[image_[p]] += is_saddle;
+        if (a != b) visit(image_[p], Saddle{a, b});
       }
     }
-  }
-  strip.saddle_count = count;
-}
-
-void Basins::sortSaddles(const Strip& strip, Histogram next) {
-  for (int i = 0; i < strip.saddle_count; ++i) {
-    saddles_[next[strip.saddles[i].level]++] = strip.saddles[i].saddle;
   }
 }
 

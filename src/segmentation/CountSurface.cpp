@@ -14,21 +14,21 @@ void validateSurface(int max_lambda, int max_h) {
   requireArgument(max_h >= 0 && max_h <= 255, "max_h", max_h, "0...255");
 }
 
-cv::Mat CountSurface::compute(const Basins& basins, int pixels, int max_lambda, int max_h) {
+cv::Mat CountSurface::compute(const Basins& basins, const CellBuffers& buffers, int pixels, int max_lambda,
+                              int max_h) {
   validateSurface(max_lambda, max_h);
   // Only the whole image reaches an area of `pixels` or more.
   largest_area_ = std::min(std::max(max_lambda, 1), pixels);
 
   const std::size_t size = basins.size();
-  for (auto* buffer : {&set_of_, &next_in_set_, &sizes_, &areas_}) growTo(*buffer, size);
+  for (auto* buffer : {&set_of_, &next_in_set_, &areas_}) growTo(*buffer, size);
   growTo(levels_, size * largest_area_);
   std::iota(set_of_.begin(), set_of_.begin() + size, 0);
   std::iota(next_in_set_.begin(), next_in_set_.begin() + size, 0);
-  std::fill_n(sizes_.begin(), size, 1);
   std::fill_n(areas_.begin(), size, 0);
   growTo(depths_, largest_area_);
   for (int a = 0; a < largest_area_; ++a) depths_[a].fill(0);
-  basins.visitPixels([&](const auto* of_pixel) { merge(basins, of_pixel); });
+  basins.visitPixels(buffers, [&](const auto* of_pixel) { merge(basins, of_pixel); });
 
   cv::Mat counts(max_lambda + 1, max_h + 1, CV_32SC1);
   for (int lambda = 0; lambda <= max_lambda; ++lambda) {
@@ -65,14 +65,13 @@ void CountSurface::merge(const Basins& basins, const Index* pixels) {
 }
 
 void CountSurface::unite(std::int32_t a, std::int32_t b, int level) {
-  if (sizes_[a] < sizes_[b]) std::swap(a, b);
+  if (areas_[a] < areas_[b]) std::swap(a, b);
   std::int32_t basin = b;
   do {
     set_of_[basin] = a;
     basin = next_in_set_[basin];
   } while (basin != b);
   std::swap(next_in_set_[a], next_in_set_[b]);
-  sizes_[a] += sizes_[b];
 
   std::uint8_t* levels = levelsOf(a);
   const std::uint8_t* others = levelsOf(b);

@@ -15,13 +15,13 @@ FilteredWatershed::FilteredWatershed(int strips) : strips_(strips) {
 }
 
 cv::Mat& FilteredWatershed::image(const cv::Size& size) {
-  requireArgument(size.width > 0 && size.height > 0, "image size",
-                  std::to_string(size.width) + "x" + std::to_string(size.height), "at least 1x1");
+  requireArgument(size.width > 0, "width of the image", size.width, "at least 1");
+  requireArgument(size.height > 0, "height of the image", size.height, "at least 1");
   const CellGrid grid(size);
   if (grid != grid_) {
     grid_ = grid;
     for (auto* cells : {&cells_, &filtered_cells_}) {
-      growTo(*cells, grid.capacity());
+      cells->resize(grid.capacity());
       grid.fillFrame(cells->data(), Basins::SUMMIT_LEVEL);
     }
     image_ = grid.image(cells_.data());
@@ -33,8 +33,8 @@ cv::Mat& FilteredWatershed::image(const cv::Size& size) {
 int FilteredWatershed::compute(int lambda, int h, Connectivity connectivity, cv::Mat& labels) {
   validateFilter(lambda, h);
   buildBasins(connectivity);
-  const int count = filter_.run(basins_, static_cast<int>(image_.total()), lambda, h);
-  numberMinima(count);
+  const int count =
+      filter_.run(basins_, buffers_, cells_.data(), static_cast<int>(image_.total()), lambda, h);
   forEachStrip(strips_, [&](int i) { applyFilter(grid_.strip(i, strips_)); });
   watershed_.compute(grid_, filtered_cells_.data(), connectivity, count, strips_, buffers_, labels);
   return count;
@@ -43,30 +43,12 @@ int FilteredWatershed::compute(int lambda, int h, Connectivity connectivity, cv:
 cv::Mat FilteredWatershed::countSurface(int max_lambda, int max_h, Connectivity connectivity) {
   validateSurface(max_lambda, max_h);
   buildBasins(connectivity);
-  return surface_.compute(basins_, static_cast<int>(image_.total()), max_lambda, max_h);
+  return surface_.compute(basins_, buffers_, static_cast<int>(image_.total()), max_lambda, max_h);
 }
 
 void FilteredWatershed::buildBasins(Connectivity connectivity) {
   requireArgument(!image_.empty(), "image", "empty", "image(size) to be called and filled first");
   basins_.build(grid_, cells_.data(), connectivity, strips_, buffers_);
-}
-
-// The first pixel of a minimum in raster order has no earlier neighbour that is as low: it makes a node.
-void FilteredWatershed::numberMinima(int count) {
-  std::vector<BasinFilter::Result>& results = filter_.results();
-  const PointerForest& forest = buffers_.forest;
-  growTo(numbers_, count);
-  std::fill_n(numbers_.begin(), count, BasinFilter::NONE);
-  int next = 0;
-  for (int node = 0; node < forest.size() && next < count; ++node) {
-    const BasinFilter::Result& result = results[forest.values()[node]];
-    if (result.minimum == BasinFilter::NONE || numbers_[result.minimum] != BasinFilter::NONE) continue;
-    if (cells_[forest.cellOf(node)] <= result.level) numbers_[result.minimum] = next++;
-  }
-  for (int basin = 0; basin < basins_.size(); ++basin) {
-    std::int32_t& minimum = results[basin].minimum;
-    if (minimum != BasinFilter::NONE) minimum = numbers_[minimum];
-  }
 }
 
 void FilteredWatershed::applyFilter(cv::Range cells) {

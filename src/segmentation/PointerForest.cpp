@@ -24,7 +24,6 @@ void PointerForest::number(const CellGrid& grid, const std::uint8_t* codes, cons
   // One more id for each strip: see numberStrip().
   for (int i = 0; i < strips; ++i) strip_begin_[i + 1] += strip_begin_[i] + 1;
   size_ = strip_begin_[strips];
-  growTo(node_cells_, size_ - first_node);
   growTo(values_, size_);
   forEachStrip(strips, [&](int i) { numberStrip(grid.strip(i, strips), strip_begin_[i], ids); });
 }
@@ -55,12 +54,12 @@ int PointerForest::countNodes(cv::Range strip) const {
 // Branches that depend on the image would cost more than the work. So the cell of the next node is written at
 // every cell, and once behind the last node.
 void PointerForest::numberStrip(cv::Range strip, int next, std::int32_t* ids) {
-  std::int32_t* node_cell = node_cells_.data() - first_node_;
+  std::int32_t* cell_of = values_.data();
   const cv::Range cells = border(strip);
   for (int p = cells.start; p < cells.end; ++p) {
     const bool is_node = makesNode(codes_[p]) || leaves(strip, p);
     ids[p] = is_node ? next : ids[p + back_[codes_[p]]];
-    node_cell[next] = p;
+    cell_of[next] = p;
     next += is_node ? 1 : 0;
   }
 
@@ -72,10 +71,10 @@ void PointerForest::numberStrip(cv::Range strip, int next, std::int32_t* ids) {
     const unsigned code = codes[p];
     const bool is_node = (code & mask) == value;
     ids[p] = select(is_node, next, ids[p + back[code]]);
-    node_cell[next] = p;
+    cell_of[next] = p;
     next += static_cast<int>(is_node);
   }
-  node_cell[next] = 0;
+  cell_of[next] = 0;
 }
 
 }  // namespace disparity_refinement

@@ -29,10 +29,11 @@ void Watershed::compute(const CellGrid& grid, const std::uint8_t* image, Connect
   grid_ = grid;
   image_ = image;
   codes_ = buffers.codes.data();
-  growTo(exit_levels_, grid.capacity());
+  exit_levels_.resize(grid.capacity());
   std::int32_t* ids = buffers.ids.data();
   grid.fillFrame(ids, 0);
-  connectivity == Connectivity::FOUR ? findDirections<4>(strips) : findDirections<8>(strips);
+  connectivity == Connectivity::FOUR ? findDirections<4>(strips, buffers.scratch)
+                                     : findDirections<8>(strips, buffers.scratch);
 
   PointerForest::Pointers pointers{};
   const std::array<int, 8> neighbours = grid.neighbours();
@@ -55,7 +56,7 @@ void Watershed::compute(const CellGrid& grid, const std::uint8_t* image, Connect
 }
 
 template <int neighbour_count>
-void Watershed::findDirections(int strips) {
+void Watershed::findDirections(int strips, Scratch& scratch) {
   queue_begin_.resize(strips + 1);
   queue_begin_[0] = 0;
   forEachStrip(strips, [&](int i) {
@@ -65,16 +66,15 @@ void Watershed::findDirections(int strips) {
   grid_.fillFrame(exit_levels_.data(), std::uint8_t{0});
 
   for (int i = 0; i < strips; ++i) queue_begin_[i + 1] += queue_begin_[i];
-  growTo(queue_, queue_begin_[strips] + 1);
+  queue_ = scratch.array<std::int32_t>(queue_begin_[strips] + 1);
   queue_end_.resize(strips);
   forEachStrip(strips, [&](int i) {
     queue_end_[i] = pointToExits<neighbour_count>(grid_.strip(i, strips), queue_begin_[i]);
   });
   int end = queue_end_[0];
   for (int i = 1; i < strips; ++i) {
-    end = static_cast<int>(
-        std::copy(queue_.begin() + queue_begin_[i], queue_.begin() + queue_end_[i], queue_.begin() + end) -
-        queue_.begin());
+    end =
+        static_cast<int>(std::copy(queue_ + queue_begin_[i], queue_ + queue_end_[i], queue_ + end) - queue_);
   }
   crossPlateaus<neighbour_count>(end);
 }
@@ -138,7 +138,7 @@ template <int neighbour_count>
 void Watershed::crossPlateaus(int end) {
   const std::array<int, 8> neighbours = grid_.neighbours();
   std::uint8_t* codes = codes_;
-  std::int32_t* queue = queue_.data();
+  std::int32_t* queue = queue_;
   for (int begin = 0; begin < end;) {
     const int wave_end = end;
     for (int k = begin; k < wave_end; ++k) {

@@ -234,7 +234,7 @@ TEST(FilteredWatershed, refusesOtherArguments) {
     return message([&] { watershed.compute(lambda, h, static_cast<Connectivity>(connectivity), labels); });
   };
   EXPECT_EQ("image is empty, expected image(size) to be called and filled first", compute(0, 0));
-  EXPECT_EQ("image size is 0x3, expected at least 1x1", message([&] { watershed.image({0, 3}); }));
+  EXPECT_EQ("width of the image is 0, expected at least 1", message([&] { watershed.image({0, 3}); }));
   watershed.image({3, 2}).setTo(1);
   EXPECT_EQ("connectivity is 6, expected 4 or 8", compute(0, 0, 6));
   EXPECT_EQ("lambda is -1, expected at least 0", compute(-1, 0));

@@ -26,7 +26,8 @@ void validateFilter(int lambda, int h);
 /// one is live, out(p) = max(f(p), T), where T depends on the basin of p only.
 ///
 /// The basins are merged along their saddles from level 0 upwards. Until they are live, the basins of a
-/// component are a set, of which the smaller is renamed when two meet; live ones need no sets any more.
+/// component are a set, of which the smaller is renamed when two meet: a basin at most log2(pixels) times;
+/// live ones need no sets any more.
 ///
 /// Buffers are kept between images; one object serves one thread at a time.
 class BasinFilter {
@@ -42,41 +43,38 @@ class BasinFilter {
   /// @param pixels  Number of pixels of the image.
   /// @param lambda  Smallest area of a component that stays [px], >= 0; 0 and 1 close nothing.
   /// @param h       Smallest depth of a minimum that stays [gray levels], 0...255; 0 fills nothing.
-  /// @return        Number of regional minima, numbered from 0 in no order that means anything.
+  /// @param image   All cells, as for Basins.
+  /// @return        Number of regional minima, numbered from 0 in raster order of their first pixels.
   /// @throws std::invalid_argument  for lambda or h out of range.
-  int run(const Basins& basins, int pixels, int lambda, int h);
+  int run(const Basins& basins, const CellBuffers& buffers, const std::uint8_t* image, int pixels, int lambda,
+          int h);
 
   /// Of every basin, after run().
-  std::vector<Result>& results() { return results_; }
+  const std::vector<Result>& results() const { return results_; }
 
  private:
   static constexpr std::int32_t LIVE = Basins::SUMMIT;  // The name of the live basins' set; SUMMIT is alone.
-  static constexpr std::int32_t NEVER = 1 << 20;
-
-  struct Set {
-    std::int32_t size;     // Basins.
-    std::int32_t reached;  // The level t0, or NEVER.
-  };
-  // Sets that will be live at the same level, unless they meet another one before.
-  struct Candidate {
-    std::int32_t set, next;
-  };
+  static constexpr std::int16_t NEVER = 1 << 12;
+  static constexpr std::int32_t NO_CANDIDATE = -1;
 
   template <typename Index>
   int merge(const Basins& basins, const Index* pixels);
   void meet(std::int32_t a, std::int32_t b, int level);
   void unite(std::int32_t larger, std::int32_t smaller, int level);
-  void reach(std::int32_t set, int level);
+  void reachLambda(std::int32_t set, int level);
   void enliven(std::int32_t set, Result result);
+  void numberMinima(const Basins& basins, const CellBuffers& buffers, const std::uint8_t* image, int count);
 
   int lambda_ = 0, h_ = 0;
   std::vector<std::int32_t> set_of_;       // Of every basin: the name of its set, a basin in it.
   std::vector<std::int32_t> next_in_set_;  // Of every basin: the basins of a set make a ring.
-  std::vector<Set> sets_;                  // By name.
-  std::vector<std::int32_t> areas_;        // Pixels so far [px], by name.
+  std::vector<std::int32_t> areas_;        // Pixels so far [px], by the name of the set.
+  std::vector<std::int16_t> reached_;      // The level t0, or NEVER, by the name of the set.
   std::vector<Result> results_;
-  std::array<std::int32_t, Basins::LEVELS> candidates_of_{};  // The first one of every level, -1 for none.
-  std::vector<Candidate> candidates_;
+  // The sets that will be live at a level, unless they meet a live one before: a list for every level. A set
+  // may have got another name since.
+  std::array<std::int32_t, Basins::LEVELS> first_candidate_{};
+  std::vector<std::int32_t> next_candidate_;
 };
 
 }  // namespace disparity_refinement

@@ -7,6 +7,7 @@
 #include "disparity_refinement/segmentation/CellGrid.hpp"
 #include "disparity_refinement/segmentation/Connectivity.hpp"
 #include "disparity_refinement/segmentation/PointerForest.hpp"
+#include "disparity_refinement/segmentation/buffers.hpp"
 
 namespace disparity_refinement {
 
@@ -15,6 +16,7 @@ struct CellBuffers {
   std::vector<std::uint8_t> codes;
   std::vector<std::int32_t> ids;
   PointerForest forest;
+  Scratch scratch;
 };
 
 /// Splits an 8-bit image f into basins, which is all that its lower components consist of.
@@ -42,7 +44,8 @@ class Basins {
   };
 
   /// @param image    All cells of the grid; 255 in its frame.
-  /// @param buffers  ids will hold the basin of every cell and forest.values() that of every node.
+  /// @param buffers  ids will hold the basin of every cell, scratch the pixels by level, for as long as they
+  ///                 are visited.
   void build(const CellGrid& grid, const std::uint8_t* image, Connectivity connectivity, int strips,
              CellBuffers& buffers);
 
@@ -52,11 +55,16 @@ class Basins {
   /// Calls visit(pixels), where pixels[i] is the basin of the i-th pixel by level: 16-bit numbers if that is
   /// enough, as there are many.
   template <typename Visitor>
-  auto visitPixels(const Visitor& visit) const {
-    return isSmall() ? visit(small_pixels_.data()) : visit(pixels_.data());
+  auto visitPixels(const CellBuffers& buffers, const Visitor& visit) const {
+    return isSmall() ? visit(buffers.scratch.data<std::uint16_t>())
+                     : visit(buffers.scratch.data<std::int32_t>());
   }
   /// The pixels of a level below SUMMIT_LEVEL.
   cv::Range pixelsOf(int level) const { return {pixel_begin_[level], pixel_begin_[level + 1]}; }
+
+  /// The cells that have no earlier lower neighbour, in raster order; where strips meet there are others too.
+  const std::vector<std::int32_t>& starts() const { return starts_; }
+  int startCount() const { return start_count_; }
 
   const Saddle* saddles() const { return saddles_.data(); }
   /// The saddles of a level below SUMMIT_LEVEL.
@@ -64,18 +72,12 @@ class Basins {
 
  private:
   using Histogram = std::array<std::int32_t, LEVELS>;
-  struct LeveledSaddle {
-    Saddle saddle;
-    std::int32_t level;
-  };
   /// What a strip adds to the counting sorts: first how many there are of every level, then where the next
   /// one goes. The pixels of even and of odd cells are counted apart, for neighbours often share a level, and
   /// two increments of one number would have to wait for each other.
   struct Strip {
     cv::Range cells;
-    Histogram even_pixels, odd_pixels, saddle_counts;
-    std::vector<LeveledSaddle> saddles;
-    int saddle_count = 0;
+    Histogram even_pixels, odd_pixels, saddles;
   };
 
   bool isSmall() const { return size_ <= 1 << 16; }
@@ -84,19 +86,19 @@ class Basins {
   void countPixels(Strip& strip);
   template <typename Index>
   void sortPixels(Strip& strip, const std::int32_t* basin_of_node, std::int32_t* ids, Index* pixels);
-  void findSaddles(Strip& strip, const CellBuffers& buffers);
-  void sortSaddles(const Strip& strip, Histogram next);
+  /// Calls visit(level, saddle) for every saddle of a strip.
+  template <typename Visitor>
+  void visitSaddles(const Strip& strip, const CellBuffers& buffers, const Visitor& visit) const;
 
   CellGrid grid_;
   const std::uint8_t* image_ = nullptr;
   Connectivity connectivity_ = Connectivity::EIGHT;
   std::vector<Strip> strips_;
   std::vector<std::uint32_t> critical_;  // A bit for every cell of a block.
-  std::vector<std::uint16_t> small_pixels_;
-  std::vector<std::int32_t> pixels_;
+  std::vector<std::int32_t> starts_;
   std::vector<Saddle> saddles_;
   std::array<int, LEVELS + 1> pixel_begin_{}, saddle_begin_{};
-  int size_ = 0;
+  int size_ = 0, start_count_ = 0;
 };
 
 }  // namespace disparity_refinement

@@ -29,7 +29,7 @@ class CountSurface {
   /// @param max_h       Largest h [gray levels], 0...255.
   /// @return            N, CV_32SC1: rows lambda = 0 ... max_lambda, columns h = 0 ... max_h.
   /// @throws std::invalid_argument  for max_lambda or max_h out of range.
-  cv::Mat compute(const Basins& basins, int pixels, int max_lambda, int max_h);
+  cv::Mat compute(const Basins& basins, const CellBuffers& buffers, int pixels, int max_lambda, int max_h);
 
  private:
   template <typename Index>
@@ -42,7 +42,7 @@ class CountSurface {
 
   std::int32_t largest_area_ = 0;
   std::vector<std::int32_t> set_of_, next_in_set_;  // As in BasinFilter.
-  std::vector<std::int32_t> sizes_, areas_;         // Basins and pixels so far, by the name of the set.
+  std::vector<std::int32_t> areas_;                 // Pixels so far [px], by the name of the set.
   std::vector<std::uint8_t> levels_;
   std::vector<std::array<std::int32_t, Basins::LEVELS>> depths_;  // By area - 1: minima of every depth.
 };

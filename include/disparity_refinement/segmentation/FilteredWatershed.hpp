@@ -47,7 +47,6 @@ class FilteredWatershed {
 
  private:
   void buildBasins(Connectivity connectivity);
-  void numberMinima(int count);
   void applyFilter(cv::Range cells);
 
   int strips_;
@@ -58,8 +57,7 @@ class FilteredWatershed {
   CountSurface surface_;
   CellBuffers buffers_;
   std::vector<std::uint8_t> cells_, filtered_cells_;
-  cv::Mat image_, filtered_;           // Their pixels.
-  std::vector<std::int32_t> numbers_;  // Of the minima, in raster order.
+  cv::Mat image_, filtered_;  // Their pixels.
 };
 
 }  // namespace disparity_refinement

@@ -39,13 +39,14 @@ class PointerForest {
   template <typename ValueOfRoot>
   void resolve(const ValueOfRoot& value_of_root);
 
-  /// The value at the end of the path of every id.
+  /// After resolve(): the value at the end of the path of every id.
   const std::vector<std::int32_t>& values() const { return values_; }
 
   /// Number of ids.
   int size() const { return size_; }
-  /// The cell of a node, first_node <= id < size(); in raster order. Where strips meet it may be 0.
-  std::int32_t cellOf(int id) const { return node_cells_[id - first_node_]; }
+  /// From number() to resolve(): the cell of a node, first_node <= id < size(); in raster order. Where strips
+  /// meet it may be 0.
+  std::int32_t cellOf(int id) const { return values_[id]; }
 
  private:
   bool makesNode(std::uint8_t code) const { return (code & pointers_.node_mask) == pointers_.node_value; }
@@ -61,7 +62,7 @@ class PointerForest {
   Pointers pointers_{};
   std::array<std::int32_t, 256> back_{};  // The offsets that are negative, else 0.
   std::vector<int> strip_begin_;          // The first id of every strip.
-  std::vector<std::int32_t> node_cells_, values_;
+  std::vector<std::int32_t> values_;
   int first_node_ = 0, size_ = 0;
 };
 
@@ -72,7 +73,7 @@ void PointerForest::resolve(const ValueOfRoot& value_of_root) {
   const int first = first_node_, size = size_;
   for (int id = 0; id < first; ++id) values[id] = ~id;
   for (int id = first; id < size; ++id) {
-    const std::int32_t cell = node_cells_[id - first];
+    const std::int32_t cell = values[id];
     const std::int32_t offset = pointers_.offset[codes_[cell]];
     values[id] = offset != 0 ? ids_[cell + offset] : ~value_of_root(cell);
   }

@@ -27,14 +27,14 @@ class Watershed {
   /// @param image    All cells of the grid; 255 in its frame.
   /// @param count    Number of regional minima.
   /// @param buffers  codes: STAYS or UNDECIDED, ids: the label, 0 ... count - 1, of every cell that STAYS;
-  ///                 both are overwritten.
+  ///                 both are overwritten, and scratch.
   /// @param labels   CV_32SC1 of the grid's size; written in place.
   void compute(const CellGrid& grid, const std::uint8_t* image, Connectivity connectivity, int count,
                int strips, CellBuffers& buffers, cv::Mat& labels);
 
  private:
   template <int neighbour_count>
-  void findDirections(int strips);
+  void findDirections(int strips, Scratch& scratch);
   template <int neighbour_count>
   int pointToLowestNeighbours(cv::Range cells);
   template <int neighbour_count>
@@ -46,7 +46,7 @@ class Watershed {
   const std::uint8_t* image_ = nullptr;
   std::uint8_t* codes_ = nullptr;
   std::vector<std::uint8_t> exit_levels_;  // The level of a cell with a lower neighbour, 0 of the others.
-  std::vector<std::int32_t> queue_;
+  std::int32_t* queue_ = nullptr;
   std::vector<int> queue_begin_, queue_end_;  // Of every strip.
 };
 
