@@ -38,9 +38,41 @@ void checkLayout(const sensor_msgs::Image& message, int bytes_per_pixel, const s
   }
 }
 
+/// cv_bridge would build a regular expression for every image.
+int typeOf(const std::string& encoding) {
+  if (encoding == enc::TYPE_32FC1) return CV_32FC1;
+  if (encoding == enc::TYPE_32SC1) return CV_32SC1;
+  return cv_bridge::getCvType(encoding);
+}
+
 bool isBigEndianMachine() {
   const std::uint16_t probe = 1;
   return *reinterpret_cast<const std::uint8_t*>(&probe) == 0;
+}
+
+/// Infinity is no disparity either, so only finite values count.
+bool isFiniteAbove(float value, float bound) {
+  return (value > bound) & (value <= std::numeric_limits<float>::max());
+}
+
+bool hasFiniteAbove(const cv::Mat& map, float bound) {
+  unsigned found = 0;
+  for (int y = 0; y < map.rows; ++y) {
+    const auto* row = map.ptr<float>(y);
+    for (int x = 0; x < map.cols; ++x) found |= isFiniteAbove(row[x], bound) ? 1U : 0U;
+  }
+  return found != 0;
+}
+
+float largestFinite(const cv::Mat& map, float at_least) {
+  float largest = at_least;
+  for (int y = 0; y < map.rows; ++y) {
+    const auto* row = map.ptr<float>(y);
+    for (int x = 0; x < map.cols; ++x) {
+      if (isFiniteAbove(row[x], largest)) largest = row[x];
+    }
+  }
+  return largest;
 }
 
 }  // namespace
@@ -71,7 +103,7 @@ sensor_msgs::ImagePtr makeImage(const std_msgs::Header& header, const cv::Size& 
   image->height = static_cast<std::uint32_t>(size.height);
   image->encoding = encoding;
   image->is_bigendian = isBigEndianMachine() ? 1 : 0;
-  image->step = image->width * static_cast<std::uint32_t>(CV_ELEM_SIZE(cv_bridge::getCvType(encoding)));
+  image->step = image->width * static_cast<std::uint32_t>(CV_ELEM_SIZE(typeOf(encoding)));
   image->data.resize(static_cast<std::size_t>(image->step) * image->height);
   return image;
 }
@@ -80,7 +112,7 @@ cv::Mat imageView(const sensor_msgs::Image& message, const std::string& encoding
   if (message.encoding != encoding) {
     refuse(topic, "encoding is '", message.encoding, "', expected ", encoding);
   }
-  const int type = cv_bridge::getCvType(encoding);
+  const int type = typeOf(encoding);
   const int element_size = CV_ELEM_SIZE1(type);
   checkLayout(message, CV_ELEM_SIZE(type), topic);
   if (element_size > 1 && (message.is_bigendian != 0) != isBigEndianMachine()) {
@@ -119,17 +151,9 @@ DisparityRange disparityRange(const stereo_msgs::DisparityImage& message, const 
   const cv::Mat map = imageView(message.image, enc::TYPE_32FC1, topic);
   DisparityRange range;
   range.min = message.min_disparity;
-  // Infinity is no disparity either, so the largest value is sought among the finite ones.
-  float largest = range.min;
-  for (int y = 0; y < map.rows; ++y) {
-    const auto* row = map.ptr<float>(y);
-    for (int x = 0; x < map.cols; ++x) {
-      if (row[x] > largest && row[x] <= std::numeric_limits<float>::max()) largest = row[x];
-    }
-  }
-  const bool is_bounded = std::isfinite(message.max_disparity) && message.max_disparity >= largest &&
-                          message.max_disparity > range.min;
-  range.max = is_bounded ? message.max_disparity : std::floor(largest) + 1.0F;
+  range.max = message.max_disparity;
+  if (std::isfinite(range.max) && range.max > range.min && !hasFiniteAbove(map, range.max)) return range;
+  range.max = std::floor(largestFinite(map, range.min)) + 1.0F;
   return range;
 }
 

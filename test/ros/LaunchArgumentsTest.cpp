@@ -165,6 +165,7 @@ TEST(RefusedStartValue, isReplacedAndReported) {
       {"segmentation/lambda", "-7", "0"},
       {"segmentation/h", "deep", "5"},
       {"segmentation/shadow_enhancement", "3", "1"},
+      {"segmentation/segmentation_threads", "100", "64"},
       {"segmentation/shadow_threshold", "999", "255"},
       {"segmentation/shadow_gamma", "0.001", "0.05"},
       {"plane_refinement/max_divergence", "-1.5", "0"},
