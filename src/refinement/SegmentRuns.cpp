@@ -39,7 +39,9 @@ void SegmentRuns::Strip::findRuns(const cv::Mat& labels, const cv::Range& rows) 
   for (int y = rows.start; y < rows.end; ++y) {
     const int* row = labels.ptr<int>(y);
     const int n = findStarts(row, labels.cols, starts.data());
-    growTo(runs, static_cast<std::size_t>(size) + n);
+    // Not growTo, for the runs of the rows above stay; resize leaves room for more too.
+    const std::size_t needed = static_cast<std::size_t>(size) + n;
+    if (runs.size() < needed) runs.resize(needed);
     for (int i = 0; i < n; ++i) {
       const int label = row[starts[i]];
       runs[size] = {{y, starts[i], starts[i + 1]}, label};
