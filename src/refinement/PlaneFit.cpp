@@ -5,15 +5,28 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <opencv2/core/hal/intrin.hpp>
+
+#include "disparity_refinement/segmentation/buffers.hpp"
 
 namespace disparity_refinement {
 namespace {
+
+constexpr float LARGEST = std::numeric_limits<float>::max();
+
+// Runs between the one that is read and the one that is fetched into the cache.
+constexpr int PREFETCH_DISTANCE = 8;
 
 // Points that score a trial: more hardly change the choice.
 constexpr int MAX_SAMPLE_SIZE = 256;
 // Points scored between two looks at whether the trial can still win; the compiler makes vectors of them.
 constexpr int BLOCK_SIZE = 32;
 static_assert(MAX_SAMPLE_SIZE % BLOCK_SIZE == 0, "the last block of a sample may be padded");
+
+// Points whose sums are taken in single precision. A lane adds up a quarter of them: the sums of disparities
+// in steps of 1/16 px are exact unless a segment is very large.
+constexpr int SUM_BLOCK_SIZE = 64;
+static_assert(SUM_BLOCK_SIZE % 4 == 0, "only the last vector of a segment may be padded");
 
 // The stopping rule promises one trial without outliers, but such a trial may still be poor, for inliers are
 // noisy too. So RANSAC goes on for a multiple of the rule's trials, and for some trials at least, as far as
@@ -27,80 +40,48 @@ class Random {
  public:
   explicit Random(std::uint64_t seed) : state_(seed) {}
 
-  // 0 ... n - 1
-  int below(int n) {
+  std::uint64_t next() {
     state_ += 0x9E3779B97F4A7C15U;
     std::uint64_t z = state_;
     z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;
     z = (z ^ (z >> 27)) * 0x94D049BB133111EBU;
-    z ^= z >> 31;
-    return static_cast<int>(((z >> 32) * static_cast<std::uint64_t>(n)) >> 32);
+    return z ^ (z >> 31);
   }
 
  private:
   std::uint64_t state_;
 };
 
-// The points that score a trial. Coordinates are relative to their centroid: single precision is enough.
+// The points that score a trial. Coordinates are relative to the origin of the segment's points: single
+// precision is enough.
 struct Sample {
   int size = 0;
-  int origin_x = 0, origin_y = 0;
   std::array<float, MAX_SAMPLE_SIZE> x, y, d;
 };
 
-// d = a x + b y + c, relative to the origin of the sample.
+// d = a x + b y + c, relative to the origin of the segment's points.
 struct Plane {
   double a = 0.0, b = 0.0, c = 0.0;
 };
 
-int countPixels(RunSpan runs) {
-  int pixels = 0;
-  for (const Run& run : runs) pixels += run.x_end - run.x_begin;
-  return pixels;
-}
-
-int countValid(const cv::Mat& disparity, DisparityRange range, RunSpan runs) {
-  int valid = 0;
-  for (const Run& run : runs) {
-    const float* row = disparity.ptr<float>(run.y);
-    for (int x = run.x_begin; x < run.x_end; ++x) valid += range.isValid(row[x]) ? 1 : 0;
-  }
-  return valid;
-}
-
 // All points, or one drawn at random from each of MAX_SAMPLE_SIZE equal parts of the points in raster order:
 // spread out like a regular stride, but never in step with the shape of the segment.
-void drawSample(const cv::Mat& disparity, DisparityRange range, RunSpan runs, int valid, Random& random,
-                Sample& sample) {
-  sample.size = std::min(valid, MAX_SAMPLE_SIZE);
-  const auto drawIndex = [&](std::int64_t part) {
-    if (valid <= MAX_SAMPLE_SIZE) return static_cast<int>(part);
-    const int begin = static_cast<int>(part * valid / MAX_SAMPLE_SIZE);
-    const int end = static_cast<int>((part + 1) * valid / MAX_SAMPLE_SIZE);
-    return begin + random.below(end - begin);
+void drawSample(const SegmentPoints& points, Random& random, Sample& sample) {
+  sample.size = std::min(points.size, MAX_SAMPLE_SIZE);
+  const auto take = [&](int i, int point) {
+    sample.x[i] = static_cast<float>(points.x[point]);
+    sample.y[i] = static_cast<float>(points.y[point]);
+    sample.d[i] = points.d[point];
   };
-
-  std::int64_t sum_x = 0, sum_y = 0;
-  int n = 0, index = 0, next = drawIndex(0);
-  for (const Run& run : runs) {
-    const float* row = disparity.ptr<float>(run.y);
-    for (int x = run.x_begin; x < run.x_end; ++x) {
-      if (!range.isValid(row[x]) || index++ != next) continue;
-      sample.x[n] = static_cast<float>(x);
-      sample.y[n] = static_cast<float>(run.y);
-      sample.d[n] = row[x];
-      sum_x += x;
-      sum_y += run.y;
-      next = ++n < sample.size ? drawIndex(n) : -1;
+  if (points.size <= MAX_SAMPLE_SIZE) {
+    for (int i = 0; i < sample.size; ++i) take(i, i);
+  } else {
+    const std::uint64_t size = static_cast<std::uint64_t>(points.size);
+    for (int i = 0; i < MAX_SAMPLE_SIZE; ++i) {
+      // The part and a random position inside it, as a binary fraction of all points.
+      const std::uint64_t position = (static_cast<std::uint64_t>(i) << 24) + (random.next() >> 40);
+      take(i, static_cast<int>((position * size) >> 32));
     }
-  }
-
-  const int points = std::max(n, 1);
-  sample.origin_x = static_cast<int>(sum_x / points);
-  sample.origin_y = static_cast<int>(sum_y / points);
-  for (int i = 0; i < sample.size; ++i) {
-    sample.x[i] -= static_cast<float>(sample.origin_x);
-    sample.y[i] -= static_cast<float>(sample.origin_y);
   }
   // Fill the last block with points that are inliers of no plane.
   for (int i = sample.size; i % BLOCK_SIZE != 0; ++i) {
@@ -113,13 +94,19 @@ bool withinSlopes(const Plane& plane, const PlaneRefinementParameters& parameter
   return std::abs(plane.a) <= parameters.max_slope_x && std::abs(plane.b) <= parameters.max_slope_y;
 }
 
+// 0 ... n - 1 for n <= MAX_SAMPLE_SIZE, from the last 21 random bits.
+int numberBelow(int n, std::uint64_t bits) {
+  return static_cast<int>(((bits & 0x1FFFFF) * static_cast<std::uint64_t>(n)) >> 21);
+}
+
 // The plane through three points drawn at random; false if they lie on a line or the plane is too steep.
 bool drawPlane(const Sample& sample, const PlaneRefinementParameters& parameters, Random& random,
                Plane& plane) {
-  const int i = random.below(sample.size);
-  int j = random.below(sample.size - 1);
+  const std::uint64_t bits = random.next();
+  const int i = numberBelow(sample.size, bits >> 43);
+  int j = numberBelow(sample.size - 1, bits >> 22);
   if (j >= i) ++j;
-  int k = random.below(sample.size - 2);
+  int k = numberBelow(sample.size - 2, bits >> 1);
   if (k >= std::min(i, j)) ++k;
   if (k >= std::max(i, j)) ++k;
 
@@ -159,63 +146,156 @@ int requiredTrials(double w, const PlaneRefinementParameters& parameters) {
   return n;
 }
 
+// Number of the inliers of a plane, and sums over them.
+enum Moment { N, X, Y, D, XX, XY, YY, XD, YD, MOMENTS };
+using Moments = std::array<double, MOMENTS>;
+
+// In a fixed order, which the reductions of OpenCV do not promise.
+double sumOfLanes(const cv::v_float32x4& lanes) {
+  float values[4];
+  cv::v_store(values, lanes);
+  return (static_cast<double>(values[0]) + values[1]) + (static_cast<double>(values[2]) + values[3]);
+}
+
+Moments sumInliers(const SegmentPoints& points, const Plane& plane, double inlier_threshold) {
+  const cv::v_float32x4 a = cv::v_setall_f32(static_cast<float>(plane.a)),
+                        b = cv::v_setall_f32(static_cast<float>(plane.b)),
+                        c = cv::v_setall_f32(static_cast<float>(plane.c)),
+                        threshold = cv::v_setall_f32(static_cast<float>(inlier_threshold)),
+                        one = cv::v_setall_f32(1.0F);
+  Moments sums = {};
+  for (int begin = 0; begin < points.size; begin += SUM_BLOCK_SIZE) {
+    cv::v_float32x4 block[MOMENTS];
+    for (auto& lanes : block) lanes = cv::v_setzero_f32();
+    const int end = std::min(begin + SUM_BLOCK_SIZE, points.size);
+    for (int i = begin; i < end; i += 4) {
+      const cv::v_float32x4 x = cv::v_cvt_f32(cv::v_load(&points.x[i])),
+                            y = cv::v_cvt_f32(cv::v_load(&points.y[i])), d = cv::v_load(&points.d[i]);
+      // False for NaN: neither padding nor its value counts.
+      const cv::v_float32x4 is_inlier = cv::v_abs(a * x + b * y + c - d) <= threshold;
+      const cv::v_float32x4 inlier_x = x & is_inlier, inlier_y = y & is_inlier, inlier_d = d & is_inlier;
+      block[N] += one & is_inlier;
+      block[X] += inlier_x;
+      block[Y] += inlier_y;
+      block[D] += inlier_d;
+      block[XX] += inlier_x * x;
+      block[XY] += inlier_x * y;
+      block[YY] += inlier_y * y;
+      block[XD] += inlier_d * x;
+      block[YD] += inlier_d * y;
+    }
+    for (int k = 0; k < MOMENTS; ++k) sums[k] += sumOfLanes(block[k]);
+  }
+  return sums;
+}
+
 // Replaces `plane` by the least-squares plane of its inliers among all points, unless that is too steep.
 // Returns the number of these inliers. They span a plane, for the points of the trial are among them.
-int refit(const cv::Mat& disparity, DisparityRange range, RunSpan runs, const Sample& sample,
-          const PlaneRefinementParameters& parameters, Plane& plane) {
-  const double threshold = parameters.inlier_threshold;
-  int inliers = 0;
-  double sum_x = 0.0, sum_y = 0.0, sum_d = 0.0;
-  double sum_xx = 0.0, sum_xy = 0.0, sum_yy = 0.0, sum_xd = 0.0, sum_yd = 0.0;
-  for (const Run& run : runs) {
-    const float* row = disparity.ptr<float>(run.y);
-    const double y = run.y - sample.origin_y;
-    const double start = plane.b * y + plane.c;
-    // Along a run y is constant.
-    int n = 0;
-    double run_x = 0.0, run_d = 0.0, run_xx = 0.0, run_xd = 0.0;
-    for (int column = run.x_begin; column < run.x_end; ++column) {
-      const double x = column - sample.origin_x, d = row[column];
-      if (!range.isValid(row[column]) || std::abs(plane.a * x + start - d) > threshold) continue;
-      ++n;
-      run_x += x;
-      run_d += d;
-      run_xx += x * x;
-      run_xd += x * d;
-    }
-    inliers += n;
-    sum_x += run_x;
-    sum_y += n * y;
-    sum_d += run_d;
-    sum_xx += run_xx;
-    sum_xy += run_x * y;
-    sum_yy += n * y * y;
-    sum_xd += run_xd;
-    sum_yd += run_d * y;
-  }
-
+int refit(const SegmentPoints& points, const PlaneRefinementParameters& parameters, Plane& plane) {
+  const Moments sums = sumInliers(points, plane, parameters.inlier_threshold);
   // Normal equations about the centroid.
-  const double xx = sum_xx - sum_x * sum_x / inliers;
-  const double xy = sum_xy - sum_x * sum_y / inliers;
-  const double yy = sum_yy - sum_y * sum_y / inliers;
-  const double xd = sum_xd - sum_x * sum_d / inliers;
-  const double yd = sum_yd - sum_y * sum_d / inliers;
+  const double mean_x = sums[X] / sums[N], mean_y = sums[Y] / sums[N];
+  const double xx = sums[XX] - mean_x * sums[X];
+  const double xy = sums[XY] - mean_x * sums[Y];
+  const double yy = sums[YY] - mean_y * sums[Y];
+  const double xd = sums[XD] - mean_x * sums[D];
+  const double yd = sums[YD] - mean_y * sums[D];
   const double determinant = xx * yy - xy * xy;
   Plane fitted;
   fitted.a = (xd * yy - yd * xy) / determinant;
   fitted.b = (yd * xx - xd * xy) / determinant;
-  fitted.c = (sum_d - fitted.a * sum_x - fitted.b * sum_y) / inliers;
+  fitted.c = (sums[D] - fitted.a * sums[X] - fitted.b * sums[Y]) / sums[N];
   if (withinSlopes(fitted, parameters)) plane = fitted;
-  return inliers;
+  return static_cast<int>(sums[N]);
+}
+
+// Writes the valid pixels of runs one after the other.
+class PointWriter {
+ public:
+  PointWriter(const DisparityRange& range, int origin_x, int* x, int* y, float* d)
+      : min_(range.min), origin_x_(origin_x), x_(x), y_(y), d_(d) {}
+
+  int size() const { return size_; }
+
+  void append(const float* row, int begin, int end, int y) {
+    const cv::v_float32x4 min = cv::v_setall_f32(min_), max = cv::v_setall_f32(LARGEST);
+    const cv::v_int32x4 steps(0, 1, 2, 3), four_y = cv::v_setall_s32(y);
+    int x = begin;
+    for (; x <= end - 4; x += 4) {
+      const cv::v_float32x4 d = cv::v_load(row + x);
+      const int valid = cv::v_signmask((d >= min) & (d <= max));
+      if (valid == 0b1111) {
+        cv::v_store(x_ + size_, cv::v_setall_s32(x - origin_x_) + steps);
+        cv::v_store(y_ + size_, four_y);
+        cv::v_store(d_ + size_, d);
+        size_ += 4;
+      } else if (valid != 0) {
+        for (int i = 0; i < 4; ++i) appendPixel(row, x + i, y);
+      }
+    }
+    for (; x < end; ++x) appendPixel(row, x, y);
+  }
+
+ private:
+  // The next pixel takes the place of one that is not valid: a branch could not be foreseen.
+  void appendPixel(const float* row, int x, int y) {
+    const float d = row[x];
+    x_[size_] = x - origin_x_;
+    y_[size_] = y;
+    d_[size_] = d;
+    size_ += static_cast<int>(d >= min_) & static_cast<int>(d <= LARGEST);
+  }
+
+  float min_;
+  int origin_x_, size_ = 0;
+  int *x_, *y_;
+  float* d_;
+};
+
+// The runs of a segment are too short for the processor to see where the next ones are.
+void prefetch(const cv::Mat& disparity, const Run& run) {
+  const float* row = disparity.ptr<float>(run.y);
+  __builtin_prefetch(row + run.x_begin);
+  __builtin_prefetch(row + run.x_end - 1);
 }
 
 }  // namespace
 
+void SegmentPoints::gather(const cv::Mat& disparity, const DisparityRange& range, RunSpan runs) {
+  pixels = 0;
+  int left = std::numeric_limits<int>::max(), right = 0;
+  for (const Run& run : runs) {
+    pixels += run.x_end - run.x_begin;
+    left = std::min(left, run.x_begin);
+    right = std::max(right, run.x_end);
+  }
+  origin_x = left + (right - left) / 2;
+  const int top = runs.begin()->y, bottom = (runs.end() - 1)->y;
+  origin_y = top + (bottom - top) / 2;
+
+  const std::size_t capacity = static_cast<std::size_t>(pixels) + PADDING;
+  growTo(x, capacity);
+  growTo(y, capacity);
+  growTo(d, capacity);
+  PointWriter points(range, origin_x, x.data(), y.data(), d.data());
+  for (const Run* run = runs.begin(); run != runs.end(); ++run) {
+    if (runs.end() - run > PREFETCH_DISTANCE) prefetch(disparity, run[PREFETCH_DISTANCE]);
+    points.append(disparity.ptr<float>(run->y), run->x_begin, run->x_end, run->y - origin_y);
+  }
+  size = points.size();
+  for (int i = 0; i < PADDING; ++i) {
+    x[size + i] = y[size + i] = 0;
+    d[size + i] = std::numeric_limits<float>::quiet_NaN();
+  }
+}
+
 SegmentPlane fitPlane(const cv::Mat& disparity, const DisparityRange& range, RunSpan runs, std::uint64_t seed,
-                      const PlaneRefinementParameters& parameters) {
+                      const PlaneRefinementParameters& parameters, SegmentPoints& points) {
   SegmentPlane result;
-  result.pixels = countPixels(runs);
-  result.valid = countValid(disparity, range, runs);
+  if (runs.begin() == runs.end()) return result;
+  points.gather(disparity, range, runs);
+  result.pixels = points.pixels;
+  result.valid = points.size;
   // The quotient, not the product with pixels: 3 of 10 then reach a fraction of 0.3 exactly.
   const double valid_fraction = static_cast<double>(result.valid) / result.pixels;
   if (result.valid < parameters.min_valid_points || valid_fraction < parameters.min_valid_fraction) {
@@ -225,34 +305,41 @@ SegmentPlane fitPlane(const cv::Mat& disparity, const DisparityRange& range, Run
 
   Random random(seed);
   Sample sample;
-  drawSample(disparity, range, runs, result.valid, random, sample);
+  drawSample(points, random, sample);
 
   Plane best;
   int most_inliers = 0;
-  int required = parameters.max_iterations + 1;
+  int required = 0;  // By the stopping rule for the best plane; 0 as long as nobody has asked.
+  const auto requiredNow = [&] {
+    if (required == 0) {
+      required = requiredTrials(static_cast<double>(most_inliers) / sample.size, parameters);
+    }
+    return required;
+  };
   for (; result.iterations < parameters.max_iterations; ++result.iterations) {
-    if (result.iterations >= MIN_TRIALS && result.iterations / TRIALS_FACTOR >= required) break;
+    if (result.iterations >= MIN_TRIALS && result.iterations / TRIALS_FACTOR >= requiredNow()) break;
+    if (most_inliers == sample.size) continue;  // No trial can be better: it need not be drawn.
     Plane plane;
     if (!drawPlane(sample, parameters, random, plane)) continue;
     const int inliers = countInliers(sample, plane, parameters.inlier_threshold, most_inliers);
     if (inliers <= most_inliers) continue;
     best = plane;
     most_inliers = inliers;
-    required = requiredTrials(static_cast<double>(inliers) / sample.size, parameters);
+    required = 0;
   }
   if (most_inliers == 0) {
     result.status = PlaneStatus::DEGENERATE;
     return result;
   }
-  if (required > parameters.max_iterations) {
+  if (requiredNow() > parameters.max_iterations) {
     result.status = PlaneStatus::MAX_ITERATIONS;
     return result;
   }
 
-  result.inliers = refit(disparity, range, runs, sample, parameters, best);
+  result.inliers = refit(points, parameters, best);
   result.a = best.a;
   result.b = best.b;
-  result.c = best.c - best.a * sample.origin_x - best.b * sample.origin_y;
+  result.c = best.c - best.a * points.origin_x - best.b * points.origin_y;
   result.status = PlaneStatus::ACCEPTED;
   return result;
 }

@@ -5,10 +5,13 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <opencv2/core/hal/intrin.hpp>
 #include <string>
 
 #include "disparity_refinement/arguments.hpp"
 #include "disparity_refinement/refinement/PlaneFit.hpp"
+#include "disparity_refinement/segmentation/buffers.hpp"
+#include "disparity_refinement/segmentation/strips.hpp"
 
 namespace disparity_refinement {
 namespace {
@@ -23,15 +26,36 @@ bool overlap(const cv::Mat& a, const cv::Mat& b) {
   return before(a.data, end(b)) && before(b.data, end(a));
 }
 
-// Copies a map. Whatever is no disparity, NaN and infinity too, becomes range.invalid().
-void copyValid(const cv::Mat& disparity, const DisparityRange range, cv::Mat& copy) {
-  for (int y = 0; y < disparity.rows; ++y) {
+// Copies rows of a map. Whatever is no disparity, NaN and infinity too, becomes range.invalid().
+void copyValid(const cv::Mat& disparity, const DisparityRange range, const cv::Range& rows, cv::Mat& copy) {
+  const float lowest = range.min, largest = std::numeric_limits<float>::max(), invalid = range.invalid();
+  for (int y = rows.start; y < rows.end; ++y) {
     const float* from = disparity.ptr<float>(y);
     float* to = copy.ptr<float>(y);
     for (int x = 0; x < disparity.cols; ++x) {
-      to[x] = range.isValid(from[x]) ? from[x] : range.invalid();
+      const float finite = from[x] <= largest ? from[x] : invalid;
+      to[x] = finite >= lowest ? finite : invalid;
     }
   }
+}
+
+// A float is at least this if, and only if, it is at least `bound`.
+float roundedUp(double bound) {
+  const float rounded = static_cast<float>(bound);
+  return rounded < bound ? std::nextafter(rounded, std::numeric_limits<float>::infinity()) : rounded;
+}
+
+// a x + start in four columns from x on. In double precision, for the start, at column 0, may be far larger
+// than the plane is inside its segment.
+cv::v_float32x4 planeAt(double a, double start, int x) {
+#if CV_SIMD128_64F
+  const cv::v_int32x4 columns = cv::v_setall_s32(x) + cv::v_int32x4(0, 1, 2, 3);
+  const cv::v_float64x2 slope = cv::v_setall_f64(a), offset = cv::v_setall_f64(start);
+  return cv::v_cvt_f32(slope * cv::v_cvt_f64(columns) + offset, slope * cv::v_cvt_f64_high(columns) + offset);
+#else
+  const auto at = [&](int column) { return static_cast<float>(a * column + start); };
+  return {at(x), at(x + 1), at(x + 2), at(x + 3)};
+#endif
 }
 
 // Writes a plane back where conditions 1 and 4, which are decided per pixel, hold.
@@ -40,44 +64,66 @@ class Reprojection {
   Reprojection(const DisparityRange& range, double focal_length_times_baseline,
                const PlaneRefinementParameters& parameters)
       : range_(range),
-        clamp_(parameters.out_of_range_action == OutOfRangeAction::CLAMP),
+        lowest_(std::numeric_limits<float>::lowest()),
+        highest_(std::numeric_limits<float>::max()),
         min_value_(range.min),
-        max_divergence_(parameters.max_divergence),
+        max_divergence_(static_cast<float>(parameters.max_divergence)),
         diverging_is_kept_(parameters.divergence_action == DivergenceAction::KEEP) {
+    if (parameters.out_of_range_action == OutOfRangeAction::CLAMP) {
+      lowest_ = range.min;
+      highest_ = range.max;
+    }
     if (parameters.disparity_error > 0.0) {
       const double depth_bound =
           std::sqrt(focal_length_times_baseline * parameters.disparity_error / parameters.max_depth_error);
-      min_value_ = std::max(min_value_, depth_bound);
+      min_value_ = std::max(min_value_, roundedUp(depth_bound));
     }
     if (parameters.divergence_action == DivergenceAction::TAKE_PLANE) {
-      max_divergence_ = std::numeric_limits<double>::infinity();
+      max_divergence_ = std::numeric_limits<float>::infinity();
     }
   }
 
+  // Every pixel holds a valid disparity or range.invalid().
   void apply(const SegmentPlane& plane, RunSpan runs, cv::Mat& disparity) const {
     const Reprojection reproject = *this;  // A local copy stays in registers.
-    const double a = plane.a;
     for (const Run& run : runs) {
-      float* row = disparity.ptr<float>(run.y);
-      const double start = plane.b * run.y + plane.c;
-      for (int x = run.x_begin; x < run.x_end; ++x) {
-        row[x] = reproject.refined(row[x], static_cast<float>(a * x + start));
-      }
+      reproject.applyToRun(plane.a, plane.b * run.y + plane.c, run.x_begin, run.x_end,
+                           disparity.ptr<float>(run.y));
     }
   }
 
  private:
-  // What becomes of a pixel of disparity d where the plane is at `value`.
-  float refined(float d, float value) const {
-    if (clamp_) value = std::min(std::max(value, range_.min), range_.max);
-    if (!(value >= min_value_ && value <= range_.max)) return d;
-    if (!range_.isValid(d) || std::abs(static_cast<double>(value) - d) <= max_divergence_) return value;
-    return diverging_is_kept_ ? d : range_.invalid();
+  void applyToRun(double a, double start, int begin, int end, float* row) const {
+    const int last = end - 4;
+    if (last < begin) {
+      float four[4] = {};
+      std::copy(row + begin, row + end, four);
+      cv::v_store(four, refined(cv::v_load(four), planeAt(a, start, begin)));
+      std::copy(four, four + (end - begin), row + begin);
+      return;
+    }
+    // Some of the last four pixels the loop may meet too: they are read before it and written after it.
+    const cv::v_float32x4 last_four = refined(cv::v_load(row + last), planeAt(a, start, last));
+    for (int x = begin; x < last; x += 4) {
+      cv::v_store(row + x, refined(cv::v_load(row + x), planeAt(a, start, x)));
+    }
+    cv::v_store(row + last, last_four);
+  }
+
+  // What becomes of pixels of disparity d where the plane is at `value`.
+  cv::v_float32x4 refined(const cv::v_float32x4& d, cv::v_float32x4 value) const {
+    const auto all = [](float number) { return cv::v_setall_f32(number); };
+    value = cv::v_min(cv::v_max(value, all(lowest_)), all(highest_));
+    const cv::v_float32x4 is_allowed = (value >= all(min_value_)) & (value <= all(range_.max));
+    const cv::v_float32x4 is_hole = d < all(range_.min);
+    const cv::v_float32x4 is_near = cv::v_absdiff(value, d) <= all(max_divergence_);
+    const cv::v_float32x4 diverging = diverging_is_kept_ ? d : all(range_.invalid());
+    return cv::v_select(is_allowed, cv::v_select(is_hole | is_near, value, diverging), d);
   }
 
   DisparityRange range_;
-  bool clamp_;
-  double min_value_, max_divergence_;
+  float lowest_, highest_;  // To which a plane's value is moved.
+  float min_value_, max_divergence_;
   bool diverging_is_kept_;
 };
 
@@ -144,14 +190,21 @@ void PlaneRefinement::refine(const cv::Mat& disparity, const cv::Mat& labels, co
   segments_.build(labels);
 
   refined.create(disparity.size(), CV_32FC1);
-  copyValid(disparity, range, refined);
-  planes_.assign(segments_.size(), SegmentPlane());
+  const int threads = std::max(1, cv::getNumThreads());
+  forEachStrip(threads,
+               [&](int i) { copyValid(disparity, range, stripOf(disparity.rows, i, threads), refined); });
+  growTo(planes_, segments_.size());
+  planes_.resize(segments_.size());
   const Reprojection reprojection(range, focal_length_times_baseline, parameters);
-  cv::parallel_for_(cv::Range(0, segments_.size()), [&](const cv::Range& part) {
+  // More strips than threads, for the segments differ in size.
+  const int strips = threads > 1 ? 8 * threads : 1;
+  if (points_.size() < static_cast<std::size_t>(strips)) points_.resize(strips);
+  forEachStrip(strips, [&](int i) {
+    const cv::Range part = stripOf(segments_.size(), i, strips);
     for (int label = part.start; label < part.end; ++label) {
       const RunSpan runs = segments_[label];
       SegmentPlane& plane = planes_[label];
-      plane = fitPlane(refined, range, runs, static_cast<std::uint64_t>(label), parameters);
+      plane = fitPlane(refined, range, runs, static_cast<std::uint64_t>(label), parameters, points_[i]);
       if (plane.status == PlaneStatus::ACCEPTED) reprojection.apply(plane, runs, refined);
     }
   });

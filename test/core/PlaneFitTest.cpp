@@ -17,7 +17,8 @@ SegmentPlane fit(const cv::Mat& disparity, const PlaneRefinementParameters& para
                  std::uint64_t seed = 0) {
   SegmentRuns segments;
   segments.build(cv::Mat::zeros(disparity.size(), CV_32SC1));
-  return fitPlane(disparity, RANGE, segments[0], seed, parameters);
+  SegmentPoints points;
+  return fitPlane(disparity, RANGE, segments[0], seed, parameters, points);
 }
 
 cv::Mat planeMap(int rows, int cols, double a, double b, double c) {
@@ -58,6 +59,44 @@ double distance(const SegmentPlane& plane, double a, double b, double c, const c
   return largest;
 }
 
+TEST(SegmentPoints, areTheValidPixelsInRasterOrder) {
+  // Runs of every length, with everything that is no disparity in them.
+  const float nothing[] = {RANGE.invalid(), std::numeric_limits<float>::quiet_NaN(),
+                           std::numeric_limits<float>::infinity(), -500.0F};
+  cv::RNG random(23);
+  SegmentPoints points;
+  for (int trial = 0; trial < 200; ++trial) {
+    cv::Mat map(random.uniform(1, 30), random.uniform(1, 30), CV_32FC1);
+    const double share = random.uniform(0.0, 1.0);
+    for (int y = 0; y < map.rows; ++y) {
+      for (int x = 0; x < map.cols; ++x) {
+        const bool is_valid = random.uniform(0.0, 1.0) < share;
+        map.at<float>(y, x) = is_valid ? random.uniform(0.0F, 200.0F) : nothing[random.uniform(0, 4)];
+      }
+    }
+    cv::Mat labels = cv::Mat::zeros(map.size(), CV_32SC1);
+    labels.colRange(0, random.uniform(0, map.cols)).setTo(-1);
+    SegmentRuns segments;
+    segments.build(labels);
+    points.gather(map, RANGE, segments[0]);
+
+    EXPECT_EQ(points.pixels, cv::countNonZero(labels == 0));
+    int n = 0;
+    for (int y = 0; y < map.rows; ++y) {
+      for (int x = 0; x < map.cols; ++x) {
+        if (labels.at<int>(y, x) != 0 || !RANGE.isValid(map.at<float>(y, x))) continue;
+        ASSERT_LT(n, points.size);
+        EXPECT_EQ(points.origin_x + points.x[n], x);
+        EXPECT_EQ(points.origin_y + points.y[n], y);
+        EXPECT_EQ(points.d[n], map.at<float>(y, x));
+        ++n;
+      }
+    }
+    EXPECT_EQ(points.size, n);
+    for (int i = 0; i < SegmentPoints::PADDING; ++i) EXPECT_TRUE(std::isnan(points.d[n + i]));
+  }
+}
+
 TEST(PlaneFit, recoversAnExactPlane) {
   const cv::Mat map = planeMap(30, 40, 0.0625, 0.25, 20.0);
   const SegmentPlane plane = fit(map);
@@ -89,6 +128,28 @@ TEST(PlaneFit, isTheLeastSquaresPlaneOfTheInliers) {
   EXPECT_NEAR(plane.a, solution.at<double>(0), 1e-9);
   EXPECT_NEAR(plane.b, solution.at<double>(1), 1e-9);
   EXPECT_NEAR(plane.c, solution.at<double>(2), 1e-9);
+}
+
+TEST(PlaneFit, isTheLeastSquaresPlaneOfALargeSegment) {
+  // The disparities are no multiples of a power of two: sums in single precision alone would not do.
+  cv::RNG random(19);
+  cv::Mat map = planeMap(400, 1100, 0.03, -0.1, 70.0);
+  for (int y = 0; y < map.rows; ++y) {
+    for (int x = 0; x < map.cols; ++x) map.at<float>(y, x) += static_cast<float>(random.gaussian(0.1));
+  }
+  const SegmentPlane plane = fit(map);
+  ASSERT_EQ(plane.inliers, 400 * 1100);
+  cv::Matx33d normal = cv::Matx33d::zeros();
+  cv::Vec3d right(0.0, 0.0, 0.0);
+  for (int y = 0; y < map.rows; ++y) {
+    for (int x = 0; x < map.cols; ++x) {
+      const cv::Vec3d point(x, y, 1.0);
+      normal += point * point.t();
+      right += map.at<float>(y, x) * point;
+    }
+  }
+  const cv::Vec3d solution = normal.solve(right, cv::DECOMP_CHOLESKY);
+  EXPECT_LT(distance(plane, solution[0], solution[1], solution[2], map.size()), 1e-5);
 }
 
 TEST(PlaneFit, recoversThePlaneBehindGrossOutliers) {
@@ -123,7 +184,8 @@ TEST(PlaneFit, countsCoordinatesFromTheCornerOfTheImage) {
   labels.colRange(1000, 2000).setTo(0);
   SegmentRuns segments;
   segments.build(labels);
-  const SegmentPlane plane = fitPlane(map, RANGE, segments[0], 0, {});
+  SegmentPoints points;
+  const SegmentPlane plane = fitPlane(map, RANGE, segments[0], 0, {}, points);
   EXPECT_EQ(plane.pixels, 10000);
   EXPECT_LT(distance(plane, 0.03125, 0.5, 3.0, map.size()), 1e-9);
 }

@@ -1,14 +1,36 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <cstddef>
+#include <cstdlib>
 #include <functional>
 #include <limits>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "disparity_refinement/refinement/PlaneRefinement.hpp"
+
+namespace {
+
+// Strings of the checked arguments do not count.
+constexpr std::size_t LARGE_ALLOCATION = 256;
+std::atomic<int> large_allocations{0};
+
+}  // namespace
+
+// Not inline: the compiler would take the halves of a pair for mismatched.
+__attribute__((noinline)) void* operator new(std::size_t size) {
+  if (size >= LARGE_ALLOCATION) ++large_allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+
+__attribute__((noinline)) void operator delete(void* memory) noexcept { std::free(memory); }
+__attribute__((noinline)) void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace disparity_refinement {
 namespace {
@@ -280,6 +302,27 @@ TEST(PlaneRefinement, replacesADisparityUpToTheLargestDivergence) {
   EXPECT_EQ(atDistance(-beyond, DivergenceAction::TAKE_PLANE), 20.0F);
 }
 
+TEST(PlaneRefinement, decidesEveryPixelOfARunOnce) {
+  // A pixel that has become invalid is not filled afterwards, wherever it is in a run of any length.
+  PlaneRefinementParameters parameters = baseParameters();
+  parameters.divergence_action = DivergenceAction::INVALIDATE;
+  for (int cols = 1; cols <= 14; ++cols) {
+    for (int x = 0; x < cols; ++x) {
+      cv::Mat map = planeMap(20, 16, 0.0, 0.0, 20.0);
+      cv::Mat labels(map.size(), CV_32SC1, cv::Scalar(-1));
+      labels.rowRange(0, 10).setTo(0);
+      labels.row(12).colRange(1, 1 + cols).setTo(0);
+      map.at<float>(12, 1 + x) = 30.0F;
+      map.at<float>(12, 0) = map.at<float>(12, 1 + cols) = 20.5F;  // Not of the segment.
+      cv::Mat expected = map.clone();
+      expected.at<float>(12, 1 + x) = HOLE;
+      cv::Mat refined;
+      PlaneRefinement().refine(map, labels, RANGE, 1.0, parameters, refined);
+      expectSameBits(refined, expected);
+    }
+  }
+}
+
 TEST(PlaneRefinement, takesNoActionOnDivergenceWhereAnotherConditionFails) {
   for (const auto action : {DivergenceAction::INVALIDATE, DivergenceAction::TAKE_PLANE}) {
     PlaneRefinementParameters parameters = depthParameters();
@@ -451,6 +494,23 @@ TEST(PlaneRefinement, isTheSameForAnyNumberOfThreads) {
     PlaneRefinement().refine(disparity, labels, RANGE, 388.0, {}, refined);
     expectSameBits(refined, expected);
   }
+  cv::setNumThreads(threads_before);
+}
+
+TEST(PlaneRefinement, keepsItsBuffers) {
+  cv::Mat disparity, labels, refined;
+  randomFrame({320, 200}, 60, 7, disparity, labels);
+  const int threads_before = cv::getNumThreads();
+  cv::setNumThreads(1);
+  PlaneRefinement refinement;
+  large_allocations = 0;
+  refinement.refine(disparity, labels, RANGE, 388.0, {}, refined);
+  EXPECT_GT(large_allocations, 0);
+  // Slightly more runs and a slightly larger segment than ever before fit too.
+  labels.rowRange(0, 2).setTo(labels.at<int>(10, 10));
+  large_allocations = 0;
+  refinement.refine(disparity, labels, RANGE, 388.0, {}, refined);
+  EXPECT_EQ(large_allocations, 0);
   cv::setNumThreads(threads_before);
 }
 

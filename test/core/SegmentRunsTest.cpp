@@ -66,6 +66,49 @@ TEST(SegmentRuns, coversEveryPixelOnceInItsOwnSegment) {
   }
 }
 
+TEST(SegmentRuns, findsARunThatBeginsAtAnyColumn) {
+  SegmentRuns segments;
+  for (int cols = 2; cols <= 20; ++cols) {
+    for (int x = 1; x < cols; ++x) {
+      cv::Mat labels = cv::Mat::zeros(2, cols, CV_32SC1);
+      labels.row(1).colRange(x, cols).setTo(1);
+      segments.build(labels);
+      ASSERT_EQ(segments.size(), 2);
+      EXPECT_EQ(text(segments, 0), "0:0-" + std::to_string(cols) + " 1:0-" + std::to_string(x) + " ");
+      EXPECT_EQ(text(segments, 1), "1:" + std::to_string(x) + "-" + std::to_string(cols) + " ");
+    }
+  }
+}
+
+TEST(SegmentRuns, isTheSameForAnyNumberOfThreads) {
+  cv::RNG random(2);
+  cv::Mat labels(23, 40, CV_32SC1);
+  random.fill(labels, cv::RNG::UNIFORM, -1, 12);
+  const int threads_before = cv::getNumThreads();
+  cv::setNumThreads(1);
+  SegmentRuns expected;
+  expected.build(labels);
+  for (const int threads : {2, 3, 50}) {
+    cv::setNumThreads(threads);
+    SegmentRuns segments;
+    segments.build(labels);
+    ASSERT_EQ(segments.size(), expected.size());
+    for (int label = 0; label < segments.size(); ++label) {
+      EXPECT_EQ(text(segments, label), text(expected, label)) << threads << " threads";
+    }
+  }
+  cv::setNumThreads(threads_before);
+}
+
+TEST(SegmentRuns, keepsTheFormerRunsWhenItRefusesALabelMap) {
+  SegmentRuns segments;
+  segments.build((cv::Mat_<int>(1, 3) << 1, 1, 0));
+  EXPECT_THROW(segments.build((cv::Mat_<int>(1, 4) << 0, 2, 3, 4)), std::invalid_argument);
+  ASSERT_EQ(segments.size(), 2);
+  EXPECT_EQ(text(segments, 0), "0:2-3 ");
+  EXPECT_EQ(text(segments, 1), "0:0-2 ");
+}
+
 TEST(SegmentRuns, refusesALabelOfAtLeastTheNumberOfPixels) {
   SegmentRuns segments;
   cv::Mat labels = (cv::Mat_<int>(2, 3) << 0, 0, 0, 0, 5, 0);

@@ -5,6 +5,7 @@
 
 #include "disparity_refinement/DisparityRange.hpp"
 #include "disparity_refinement/refinement/PlaneRefinement.hpp"
+#include "disparity_refinement/refinement/SegmentPoints.hpp"
 #include "disparity_refinement/refinement/SegmentRuns.hpp"
 
 namespace disparity_refinement {
@@ -20,7 +21,8 @@ namespace disparity_refinement {
 /// @param disparity   CV_32FC1 [px], finite where range.isValid.
 /// @param seed        Of the random numbers; the same seed and points give the same bits on every machine.
 /// @param parameters  Valid ones.
+/// @param points      Buffers; the points of the segment afterwards, unless it has no pixel.
 SegmentPlane fitPlane(const cv::Mat& disparity, const DisparityRange& range, RunSpan runs, std::uint64_t seed,
-                      const PlaneRefinementParameters& parameters);
+                      const PlaneRefinementParameters& parameters, SegmentPoints& points);
 
 }  // namespace disparity_refinement

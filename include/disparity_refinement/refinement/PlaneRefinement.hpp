@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "disparity_refinement/DisparityRange.hpp"
+#include "disparity_refinement/refinement/SegmentPoints.hpp"
 #include "disparity_refinement/refinement/SegmentRuns.hpp"
 
 namespace disparity_refinement {
@@ -69,7 +70,7 @@ struct SegmentPlane {
   int pixels = 0;                    ///< Pixels of the segment; 0 if no pixel has this label.
   int valid = 0;                     ///< Pixels with a disparity: the support.
   int inliers = 0;                   ///< Those of them to which the plane was fitted; 0 unless ACCEPTED.
-  int iterations = 0;                ///< RANSAC trials made.
+  int iterations = 0;                ///< RANSAC trials; those that could not win any more count too.
   PlaneStatus status = PlaneStatus::TOO_FEW_POINTS;
 
   double inlierShare() const { return valid > 0 ? static_cast<double>(inliers) / valid : 0.0; }
@@ -101,6 +102,7 @@ class PlaneRefinement {
 
  private:
   SegmentRuns segments_;
+  std::vector<SegmentPoints> points_;  // Buffers of the strips of segments.
   std::vector<SegmentPlane> planes_;
 };
 

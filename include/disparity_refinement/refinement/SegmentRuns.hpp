@@ -26,11 +26,11 @@ class RunSpan {
 class SegmentRuns {
  public:
   /// @param labels  CV_32SC1; negative labels belong to no segment. Buffers of former label maps are reused.
-  /// @throws std::invalid_argument  for a label of at least the number of pixels.
+  /// @throws std::invalid_argument  for a label of at least the number of pixels; the former runs stay.
   void build(const cv::Mat& labels);
 
   /// Largest label + 1.
-  int size() const { return static_cast<int>(first_run_.size()) - 1; }
+  int size() const { return size_; }
 
   /// The runs of a label, 0 <= label < size(), in raster order; none for a label that does not occur.
   RunSpan operator[](int label) const {
@@ -38,7 +38,29 @@ class SegmentRuns {
   }
 
  private:
-  std::vector<int> first_run_ = {0};  // Of every label, and the number of runs at the end.
+  struct LabelledRun {
+    Run run;
+    int label;
+  };
+
+  /// The runs of some rows in raster order, but none of negative labels.
+  struct Strip {
+    void findRuns(const cv::Mat& labels, const cv::Range& rows);
+    const LabelledRun* begin() const { return runs.data(); }
+    const LabelledRun* end() const { return runs.data() + size; }
+
+    std::vector<int> starts;  // Of the runs of one row [px].
+    std::vector<LabelledRun> runs;
+    int size = 0;
+  };
+
+  /// Largest label of the strips, -1 without any run.
+  int largestLabel(int strips, const cv::Mat& labels) const;
+  void sortByLabel(int strips);
+
+  std::vector<Strip> strips_;
+  int size_ = 0;
+  std::vector<int> first_run_;  // Of every label, and the number of runs at the end.
   std::vector<Run> runs_;
 };
 
