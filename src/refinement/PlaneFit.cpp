@@ -7,7 +7,7 @@
 #include <limits>
 #include <opencv2/core/hal/intrin.hpp>
 
-#include "disparity_refinement/segmentation/buffers.hpp"
+#include "disparity_refinement/buffers.hpp"
 
 namespace disparity_refinement {
 namespace {

@@ -9,9 +9,9 @@
 #include <string>
 
 #include "disparity_refinement/arguments.hpp"
+#include "disparity_refinement/buffers.hpp"
 #include "disparity_refinement/refinement/PlaneFit.hpp"
-#include "disparity_refinement/segmentation/buffers.hpp"
-#include "disparity_refinement/segmentation/strips.hpp"
+#include "disparity_refinement/strips.hpp"
 
 namespace disparity_refinement {
 namespace {
@@ -180,8 +180,10 @@ void PlaneRefinement::refine(const cv::Mat& disparity, const cv::Mat& labels, co
   requireImage(disparity, "disparity", CV_32FC1);
   requireImage(labels, "labels", CV_32SC1, disparity.size());
   requireArgument(std::isfinite(range.min), "range.min", range.min, "a finite number");
-  requireArgument(std::isfinite(range.max) && range.max >= range.min, "range.max", range.max,
-                  "a finite number, at least range.min, " + std::to_string(range.min));
+  if (!(std::isfinite(range.max) && range.max >= range.min)) {
+    requireArgument(false, "range.max", range.max,
+                    "a finite number, at least range.min, " + std::to_string(range.min));
+  }
   requireArgument(focal_length_times_baseline > 0.0 && std::isfinite(focal_length_times_baseline),
                   "focal_length_times_baseline", focal_length_times_baseline, "greater than 0");
   validate(parameters);

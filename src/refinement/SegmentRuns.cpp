@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "disparity_refinement/segmentation/buffers.hpp"
-#include "disparity_refinement/segmentation/strips.hpp"
+#include "disparity_refinement/buffers.hpp"
+#include "disparity_refinement/strips.hpp"
 
 namespace disparity_refinement {
 namespace {

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "disparity_refinement/arguments.hpp"
-#include "disparity_refinement/segmentation/buffers.hpp"
+#include "disparity_refinement/buffers.hpp"
 
 namespace disparity_refinement {
 

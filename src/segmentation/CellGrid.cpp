@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "disparity_refinement/arguments.hpp"
-#include "disparity_refinement/segmentation/strips.hpp"
+#include "disparity_refinement/strips.hpp"
 
 namespace disparity_refinement {
 

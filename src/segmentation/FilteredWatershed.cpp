@@ -4,9 +4,9 @@
 #include <string>
 
 #include "disparity_refinement/arguments.hpp"
+#include "disparity_refinement/buffers.hpp"
 #include "disparity_refinement/segmentation/branchless.hpp"
-#include "disparity_refinement/segmentation/buffers.hpp"
-#include "disparity_refinement/segmentation/strips.hpp"
+#include "disparity_refinement/strips.hpp"
 
 namespace disparity_refinement {
 

@@ -6,7 +6,7 @@
 #include <opencv2/core/hal/intrin.hpp>
 
 #include "disparity_refinement/arguments.hpp"
-#include "disparity_refinement/segmentation/strips.hpp"
+#include "disparity_refinement/strips.hpp"
 
 namespace disparity_refinement {
 namespace {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <opencv2/core/hal/intrin.hpp>
 
+#include "disparity_refinement/buffers.hpp"
 #include "disparity_refinement/segmentation/branchless.hpp"
-#include "disparity_refinement/segmentation/buffers.hpp"
-#include "disparity_refinement/segmentation/strips.hpp"
+#include "disparity_refinement/strips.hpp"
 
 namespace disparity_refinement {
 

@@ -4,8 +4,8 @@
 #include <array>
 #include <opencv2/core/hal/intrin.hpp>
 
-#include "disparity_refinement/segmentation/buffers.hpp"
-#include "disparity_refinement/segmentation/strips.hpp"
+#include "disparity_refinement/buffers.hpp"
+#include "disparity_refinement/strips.hpp"
 
 namespace disparity_refinement {
 namespace {

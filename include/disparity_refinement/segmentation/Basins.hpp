@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "disparity_refinement/buffers.hpp"
 #include "disparity_refinement/segmentation/CellGrid.hpp"
 #include "disparity_refinement/segmentation/Connectivity.hpp"
 #include "disparity_refinement/segmentation/PointerForest.hpp"
-#include "disparity_refinement/segmentation/buffers.hpp"
 
 namespace disparity_refinement {
 
