@@ -38,7 +38,7 @@ void registerBenchmark(const std::string& set, const std::string& name, int thre
     }
     cv::setNumThreads(1);
     state.counters["megapixels"] = frames.megapixels();
-    state.counters["threads"] = threads;
+    state.counters["threads_used"] = threads;
   };
   benchmark::RegisterBenchmark((set + "/" + name).c_str(), measure)
       ->Unit(benchmark::kMillisecond)
