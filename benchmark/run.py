@@ -10,6 +10,8 @@ import live_chain
 import stages
 from common import markdown_table, text_table
 
+MARKER = "<!-- scripts/benchmark --markdown writes what follows. -->"
+
 
 def machine():
     def first(file, key, separator):
@@ -45,18 +47,25 @@ def sections(figures):
         yield "Instructions and memory", text, instructions.table(figures["instructions"])
 
 
+def write_markdown(file, parts):
+    tables = "\n\n".join(f"## {title}\n\n{text}\n\n{markdown_table(rows)}" for title, text, rows in parts)
+    before, marker, _ = file.read_text().partition(MARKER)
+    file.write_text((before + marker + "\n\n" if marker else "") + tables + "\n")
+
+
 def main():
     parser = argparse.ArgumentParser(prog="scripts/benchmark", description="Measures how fast the package is, in ratios "
                                      "to OpenCV's matchers in the same run. docs/performance.md explains the tables.")
     parser.add_argument("--short", action="store_true", help="less of everything, in about a minute")
     parser.add_argument("--json", metavar="FILE", help="write every figure")
-    parser.add_argument("--markdown", metavar="FILE", help="write the tables, for docs/performance.md")
+    parser.add_argument("--markdown", metavar="FILE", help="write the tables; in a file that has the line "
+                        f"{MARKER}, as docs/performance.md does, they replace what follows it")
     parser.add_argument("--instructions", action="store_true",
                         help="only instructions and memory; exit code 1 above a bound of "
                         "benchmark/instruction_bounds.txt")
     parser.add_argument("--set-bounds", action="store_true", help="the same, and set the bounds by what was counted")
     options = parser.parse_args()
-    # Before hours of measuring.
+    # A file that cannot be written is told before minutes of measuring.
     for file in filter(None, (options.json, options.markdown)):
         pathlib.Path(file).touch()
 
@@ -72,8 +81,7 @@ def main():
     parts = list(sections(figures))
     print("\n\n".join(f"{title}\n{text}\n\n{text_table(rows)}" for title, text, rows in parts))
     if options.markdown:
-        pathlib.Path(options.markdown).write_text(
-            "\n\n".join(f"## {title}\n\n{text}\n\n{markdown_table(rows)}" for title, text, rows in parts) + "\n")
+        write_markdown(pathlib.Path(options.markdown), parts)
     if options.json:
         pathlib.Path(options.json).write_text(json.dumps(figures, indent=1) + "\n")
     failures = instructions.failures(figures["instructions"]) if options.instructions else []

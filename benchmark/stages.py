@@ -38,7 +38,8 @@ def run_sets(sets, repetitions):
         with open(file.name) as text:
             results = json.load(text)["benchmarks"]
     figures = {}
-    for result in results:
+    # Interleaving shuffles them.
+    for result in sorted(results, key=lambda result: result.get("family_index", 0)):
         if result.get("run_type") == "aggregate":
             continue
         name, stage = re.sub("/(real_time|repeats:[0-9]+)", "", result["name"]).split("/", 1)
