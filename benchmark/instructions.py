@@ -23,8 +23,7 @@ def count(stage, folder, runs):
 
 
 def measure():
-    """{set: {stage: {instructions, instructions_per_pixel, bytes_per_pixel}}}"""
-    width, height = map(int, STREET.split("x"))
+    """{set: {stage: {instructions, bytes_per_pixel}}}"""
     figures = {}
     for name in [STREET] + (["KITTI"] if os.environ.get("DISPARITY_REFINEMENT_KITTI") else []):
         progress(f"Counting instructions: {name}")

@@ -102,17 +102,14 @@ def launch(nodelets, bag, input_rate, frames, folder):
 
 
 def end(process):
-    """Ends roslaunch, which ends its nodes; what is left of its group is killed."""
-    for sign, seconds in ((signal.SIGINT, 30), (signal.SIGTERM, 10)):
-        if process.poll() is None:
-            process.send_signal(sign)
-            try:
-                process.wait(timeout=seconds)
-            except subprocess.TimeoutExpired:
-                pass
+    """Ends roslaunch, which ends its nodes: by SIGKILL those that do not end otherwise, which takes it a while."""
     if process.poll() is None:
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(timeout=90)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
 
 
 def percentile(values, share):
@@ -163,7 +160,8 @@ def measure(short):
             input_rate *= 2.0
             fast = play(input_rate, 45 if short else BAG_FRAMES)
         # One rate for all, so that their shares of the processors can be compared.
-        slow = play(0.5 * min(figures["rate"] for figures in fast.values()), 12 if short else 40)
+        input_rate = 0.5 * min(figures["rate"] for figures in fast.values())
+        slow = play(input_rate, max(10, min(40, round((3 if short else 10) * input_rate))))
     finally:
         shutil.rmtree(folder)
     return {

@@ -3,6 +3,7 @@ import argparse
 import json
 import os
 import pathlib
+import signal
 import sys
 
 import instructions
@@ -90,6 +91,8 @@ def main():
     sys.exit(1 if failures else 0)
 
 
+# As an exception: what was started is ended.
+signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
 try:
     main()
 except KeyboardInterrupt:

@@ -2,6 +2,7 @@
 import json
 import os
 import re
+import subprocess
 import tempfile
 
 from common import BIN, at_most, progress, run
@@ -34,7 +35,7 @@ def run_sets(sets, repetitions):
         # Since Google Benchmark 1.6: what else the machine does hits all alike.
         if "random_interleaving" in run([BIN / "StageBenchmark", "--help"]):
             command.append("--benchmark_enable_random_interleaving=true")
-        run(command, stderr=open(os.devnull, "w"))
+        run(command, stderr=subprocess.PIPE)
         with open(file.name) as text:
             results = json.load(text)["benchmarks"]
     figures = {}
