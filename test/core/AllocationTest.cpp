@@ -6,7 +6,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "AllocationCounter.hpp"
+#include "../AllocationCounter.hpp"
 #include "disparity_refinement/evaluation/SyntheticStreet.hpp"
 #include "disparity_refinement/matching/StereoMatcher.hpp"
 #include "disparity_refinement/refinement/PlaneRefinement.hpp"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "AllocationCounter.hpp"
+#include "../AllocationCounter.hpp"
 #include "ChainClient.hpp"
 #include "disparity_refinement/matching/StereoMatcher.hpp"
 

@@ -1,4 +1,4 @@
-#include "straightforward/MinTree.hpp"
+#include "MinTree.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "straightforward/PaddedImage.hpp"
+#include "PaddedImage.hpp"
 
 #include <cstdint>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "straightforward/Watershed.hpp"
+#include "Watershed.hpp"
 
 #include <array>
 

@@ -4,8 +4,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "PaddedImage.hpp"
 #include "disparity_refinement/segmentation/Connectivity.hpp"
-#include "straightforward/PaddedImage.hpp"
 
 namespace disparity_refinement {
 namespace straightforward {
