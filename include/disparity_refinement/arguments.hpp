@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <opencv2/core.hpp>
 #include <sstream>
 #include <stdexcept>
@@ -33,6 +34,16 @@ inline void requireImage(const cv::Mat& image, const char* name, int type, const
 /// The same for an image of any size.
 inline void requireImage(const cv::Mat& image, const char* name, int type) {
   requireImage(image, name, type, cv::Size(image.cols, image.rows));
+}
+
+/// Whether the bytes from the first to the last pixel of two images meet.
+inline bool overlap(const cv::Mat& a, const cv::Mat& b) {
+  if (a.empty() || b.empty()) return false;
+  const auto end = [](const cv::Mat& image) {
+    return image.ptr(image.rows - 1) + image.cols * image.elemSize();
+  };
+  const std::less<const uchar*> before;
+  return before(a.data, end(b)) && before(b.data, end(a));
 }
 
 }  // namespace disparity_refinement

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <type_traits>
 #include <vector>
@@ -7,12 +8,14 @@
 namespace disparity_refinement {
 
 /// Makes a buffer hold at least n values. The number depends on what an image shows: there is some room for
-/// more, so that not every frame that has a little more of it means an allocation.
+/// more, so that not every frame that has a little more of it means an allocation. What the buffer holds may
+/// be lost.
+/// @param usual  Numbers up to this shall not mean another allocation.
 template <typename T>
-void growTo(std::vector<T>& buffer, std::size_t n) {
+void growTo(std::vector<T>& buffer, std::size_t n, std::size_t usual = 0) {
   if (buffer.capacity() < n) {
-    buffer = {};  // What it holds is not needed: no copy of it beside the new one.
-    buffer.reserve(n + n / 8);
+    buffer = {};  // First: no copy beside the new one.
+    buffer.reserve(std::max(n + n / 8, usual));
   }
   if (buffer.size() < n) buffer.resize(n);
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <opencv2/core/hal/intrin.hpp>
 #include <string>
@@ -15,16 +14,6 @@
 
 namespace disparity_refinement {
 namespace {
-
-// Whether the bytes from the first to the last pixel of two images meet.
-bool overlap(const cv::Mat& a, const cv::Mat& b) {
-  if (a.empty() || b.empty()) return false;
-  const auto end = [](const cv::Mat& image) {
-    return image.ptr(image.rows - 1) + image.cols * image.elemSize();
-  };
-  const std::less<const uchar*> before;
-  return before(a.data, end(b)) && before(b.data, end(a));
-}
 
 // Copies rows of a map. Whatever is no disparity, NaN and infinity too, becomes range.invalid().
 void copyValid(const cv::Mat& disparity, const DisparityRange range, const cv::Range& rows, cv::Mat& copy) {

@@ -10,7 +10,8 @@
 namespace disparity_refinement {
 
 void validateSurface(int max_lambda, int max_h) {
-  requireArgument(max_lambda >= 0, "max_lambda", max_lambda, "at least 0");
+  requireArgument(max_lambda >= 0 && max_lambda <= CountSurface::MAX_LAMBDA, "max_lambda", max_lambda,
+                  "0...1000");
   requireArgument(max_h >= 0 && max_h <= 255, "max_h", max_h, "0...255");
 }
 
@@ -49,7 +50,7 @@ void CountSurface::merge(const Basins& basins, const Index* pixels) {
     for (int i = own_pixels.start; i < own_pixels.end; ++i) {
       const std::int32_t set = set_of_[pixels[i]];
       const std::int32_t area = ++areas_[set];
-      if (area <= largest_area_) levelsOf(set)[area] = static_cast<std::uint8_t>(level);
+      if (area <= largest_area_) levelsOf(set)[area - 1] = static_cast<std::uint8_t>(level);
     }
     const cv::Range saddles = basins.saddlesOf(level);
     for (int i = saddles.start; i < saddles.end; ++i) {
@@ -78,16 +79,16 @@ void CountSurface::unite(std::int32_t a, std::int32_t b, int level) {
   const std::int32_t known = std::min(areas_[a], largest_area_),
                      known_of_b = std::min(areas_[b], largest_area_);
   const std::int32_t common = std::min(known, known_of_b);
-  for (std::int32_t area = 1; area <= common; ++area) {
-    const auto [first, last] = std::minmax(levels[area], others[area]);
-    ++depths_[area - 1][level - last];
-    levels[area] = first;
+  for (std::int32_t i = 0; i < common; ++i) {
+    const auto [first, last] = std::minmax(levels[i], others[i]);
+    ++depths_[i][level - last];
+    levels[i] = first;
   }
-  for (std::int32_t area = known + 1; area <= known_of_b; ++area) levels[area] = others[area];
+  for (std::int32_t i = known; i < known_of_b; ++i) levels[i] = others[i];
   areas_[a] += areas_[b];
   const std::int32_t reached = std::min(areas_[a], largest_area_);
-  for (std::int32_t area = std::max(known, known_of_b) + 1; area <= reached; ++area) {
-    levels[area] = static_cast<std::uint8_t>(level);
+  for (std::int32_t i = std::max(known, known_of_b); i < reached; ++i) {
+    levels[i] = static_cast<std::uint8_t>(level);
   }
 }
 

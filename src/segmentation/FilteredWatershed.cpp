@@ -4,7 +4,6 @@
 #include <string>
 
 #include "disparity_refinement/arguments.hpp"
-#include "disparity_refinement/buffers.hpp"
 #include "disparity_refinement/segmentation/branchless.hpp"
 #include "disparity_refinement/strips.hpp"
 
@@ -14,27 +13,24 @@ FilteredWatershed::FilteredWatershed(int strips) : strips_(strips) {
   requireArgument(strips >= 1 && strips <= MAX_STRIPS, "strips", strips, "1..." + std::to_string(MAX_STRIPS));
 }
 
-cv::Mat& FilteredWatershed::image(const cv::Size& size) {
+cv::Mat FilteredWatershed::image(const cv::Size& size) {
   requireArgument(size.width > 0, "width of the image", size.width, "at least 1");
   requireArgument(size.height > 0, "height of the image", size.height, "at least 1");
   const CellGrid grid(size);
   if (grid != grid_) {
-    grid_ = grid;
     for (auto* cells : {&cells_, &filtered_cells_}) {
       cells->resize(grid.capacity());
       grid.fillFrame(cells->data(), Basins::SUMMIT_LEVEL);
     }
-    image_ = grid.image(cells_.data());
-    filtered_ = grid.image(filtered_cells_.data());
+    grid_ = grid;  // Last: without the memory the former image would stay.
   }
-  return image_;
+  return image();
 }
 
 int FilteredWatershed::compute(int lambda, int h, Connectivity connectivity, cv::Mat& labels) {
   validateFilter(lambda, h);
   buildBasins(connectivity);
-  const int count =
-      filter_.run(basins_, buffers_, cells_.data(), static_cast<int>(image_.total()), lambda, h);
+  const int count = filter_.run(basins_, buffers_, cells_.data(), grid_.size().area(), lambda, h);
   forEachStrip(strips_, [&](int i) { applyFilter(grid_.strip(i, strips_)); });
   watershed_.compute(grid_, filtered_cells_.data(), connectivity, count, strips_, buffers_, labels);
   return count;
@@ -43,11 +39,11 @@ int FilteredWatershed::compute(int lambda, int h, Connectivity connectivity, cv:
 cv::Mat FilteredWatershed::countSurface(int max_lambda, int max_h, Connectivity connectivity) {
   validateSurface(max_lambda, max_h);
   buildBasins(connectivity);
-  return surface_.compute(basins_, buffers_, static_cast<int>(image_.total()), max_lambda, max_h);
+  return surface_.compute(basins_, buffers_, grid_.size().area(), max_lambda, max_h);
 }
 
 void FilteredWatershed::buildBasins(Connectivity connectivity) {
-  requireArgument(!image_.empty(), "image", "empty", "image(size) to be called and filled first");
+  requireArgument(grid_.rows() > 0, "image", "empty", "image(size) to be called and filled first");
   basins_.build(grid_, cells_.data(), connectivity, strips_, buffers_);
 }
 

@@ -46,13 +46,14 @@ void Gradient::compute(const cv::Mat& gray, const GradientParameters& parameters
                        int strips) {
   validate(parameters);
   requireImage(gray, "gray", CV_8UC1);
+  requireArgument(strips >= 1, "strips", strips, "at least 1");
   if (shadow_table_gamma_ != parameters.shadow_gamma) {
     fillShadowTable(parameters.shadow_gamma, shadow_table_);
     shadow_table_gamma_ = parameters.shadow_gamma;
   }
   lines_.resize(strips);
   // Rows that are still needed must not be overwritten.
-  const cv::Mat source = gray.data == gradient.data ? gray.clone() : gray;
+  const cv::Mat source = overlap(gray, gradient) ? gray.clone() : gray;
   gradient.create(source.size(), CV_8UC1);
   forEachStrip(strips, [&](int i) {
     for (Line* line : {&lines_[i].own, &lines_[i].highest, &lines_[i].lowest}) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <opencv2/core/hal/intrin.hpp>
 
+#include "disparity_refinement/buffers.hpp"
 #include "disparity_refinement/segmentation/branchless.hpp"
 #include "disparity_refinement/strips.hpp"
 
@@ -23,8 +24,8 @@ void PointerForest::number(const CellGrid& grid, const std::uint8_t* codes, cons
   // One more id for each strip: see numberStrip().
   for (int i = 0; i < strips; ++i) strip_begin_[i + 1] += strip_begin_[i] + 1;
   size_ = strip_begin_[strips];
-  // Enough for nearly all images of the size: their numbers of nodes differ much.
-  values_.resize(std::max<std::size_t>(size_, grid.capacity() / 2));
+  // Half the cells are enough for what cameras see: the numbers of nodes differ much.
+  growTo(values_, size_, grid.capacity() / 2);
   forEachStrip(strips, [&](int i) { numberStrip(grid.strip(i, strips), strip_begin_[i], ids); });
 }
 

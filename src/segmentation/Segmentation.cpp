@@ -26,7 +26,8 @@ cv::Mat Segmentation::countSurface(const cv::Mat& gray, const SegmentationParame
 void Segmentation::computeGradient(const cv::Mat& gray, const SegmentationParameters& parameters) {
   validate(parameters);
   requireImage(gray, "gray", CV_8UC1);
-  gradient_.compute(gray, parameters.gradient, watershed_.image(gray.size()), strips_);
+  cv::Mat image = watershed_.image(gray.size());
+  gradient_.compute(gray, parameters.gradient, image, strips_);
 }
 
 }  // namespace disparity_refinement

@@ -4,6 +4,8 @@
 
 #include <memory>
 #include <opencv2/core.hpp>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "../AllocationCounter.hpp"
@@ -79,6 +81,23 @@ TEST_F(Allocation, ofTheSegmentationIsAtMost16BytesAPixel) {
   RecordProperty("bytes_per_pixel", std::to_string(bytes_per_pixel));
   EXPECT_LE(bytes_per_pixel, 16.0);
   EXPECT_GE(bytes_per_pixel, 8.0) << "gradient, filtered image, codes, exits and ids alone take that much";
+}
+
+TEST_F(Allocation, ofTheSegmentationIsAtMost36BytesAPixelForNoiseAndPatterns) {
+  cv::Mat noise(500, 800, CV_8UC1), board(500, 800, CV_8UC1), labels(500, 800, CV_32SC1);
+  cv::RNG(1).fill(noise, cv::RNG::UNIFORM, 0, 256);
+  for (int y = 0; y < board.rows; ++y) {
+    for (int x = 0; x < board.cols; ++x) board.at<std::uint8_t>(y, x) = (x + y) % 2 == 0 ? 0 : 1;
+  }
+  for (const cv::Mat& image : {noise, board}) {
+    for (const Connectivity connectivity : {Connectivity::FOUR, Connectivity::EIGHT}) {
+      FilteredWatershed watershed;
+      startCounting();
+      image.copyTo(watershed.image(image.size()));
+      watershed.compute(0, 0, connectivity, labels);
+      EXPECT_LE(static_cast<double>(stopCounting().growth) / image.total(), 36.0);
+    }
+  }
 }
 
 TEST_F(Allocation, isDoneByThePlaneRefinementForTheFirstFramesOnly) {

@@ -245,13 +245,24 @@ TEST(FilteredWatershed, refusesOtherArguments) {
   const auto surface = [&](int max_lambda, int max_h) {
     return message([&] { watershed.countSurface(max_lambda, max_h, Connectivity::FOUR); });
   };
-  EXPECT_EQ("max_lambda is -1, expected at least 0", surface(-1, 0));
+  EXPECT_EQ("max_lambda is -1, expected 0...1000", surface(-1, 0));
   EXPECT_EQ("max_h is -1, expected 0...255", surface(0, -1));
   EXPECT_EQ("max_h is 256, expected 0...255", surface(0, 256));
 
   EXPECT_EQ("strips is 0, expected 1...64", message([] { FilteredWatershed(0); }));
   EXPECT_EQ("strips is 65, expected 1...64", message([] { FilteredWatershed(65); }));
   EXPECT_NE("", message([&] { watershed.image({50000, 50000}); })) << "beyond 32-bit indices";
+}
+
+TEST(FilteredWatershed, isIndependentOfItsCopy) {
+  FilteredWatershed one;
+  const cv::Mat minima = (Row(1, 5) << 1, 9, 1, 9, 1), flat = (Row(1, 5) << 1, 1, 1, 1, 1);
+  minima.copyTo(one.image(minima.size()));
+  FilteredWatershed other = one;
+  flat.copyTo(one.image(flat.size()));
+  cv::Mat labels;
+  EXPECT_EQ(3, other.compute(0, 0, Connectivity::FOUR, labels));
+  EXPECT_EQ(1, one.compute(0, 0, Connectivity::FOUR, labels));
 }
 
 /// Compares everything with the straightforward chain: a min-tree of the pixels, and a watershed of the
@@ -308,7 +319,7 @@ cv::Mat randomScene(RandomImages& images) {
 TEST(FilteredWatershed, equalsTheStraightforwardChainOnRandomImages) {
   RandomImages images(20);
   std::vector<std::unique_ptr<Comparison>> comparisons;
-  for (const int strips : {1, 2, 3, 7}) comparisons.push_back(std::make_unique<Comparison>(strips));
+  for (const int strips : {1, 2, 3, 7, 64}) comparisons.push_back(std::make_unique<Comparison>(strips));
   for (int i = 0; i < 40000; ++i) {
     const cv::Mat image = i % 20 == 0 ? randomScene(images) : images.next();
     ASSERT_TRUE(comparisons[i / 2 % comparisons.size()]->equal(image, randomLambda(images, image),

@@ -49,7 +49,7 @@ class BasinFilter {
   int run(const Basins& basins, const CellBuffers& buffers, const std::uint8_t* image, int pixels, int lambda,
           int h);
 
-  /// Of every basin, after run().
+  /// Of every basin after run(), by its number; there may be more behind.
   const std::vector<Result>& results() const { return results_; }
 
  private:

@@ -13,8 +13,9 @@ namespace disparity_refinement {
 
 /// What the stages of the segmentation write into every cell, one stage after the other.
 struct CellBuffers {
-  std::vector<std::uint8_t> codes;
-  std::vector<std::int32_t> ids;
+  std::vector<std::uint8_t>
+      codes;                      ///< Lower neighbours, then whether a cell is in a minimum, then directions.
+  std::vector<std::int32_t> ids;  ///< Nodes, then basins, then labels, then nodes again.
   PointerForest forest;
   Scratch scratch;
 };
@@ -63,6 +64,7 @@ class Basins {
   cv::Range pixelsOf(int level) const { return {pixel_begin_[level], pixel_begin_[level + 1]}; }
 
   /// The cells that have no earlier lower neighbour, in raster order; where strips meet there are others too.
+  /// The first startCount() of them count.
   const std::vector<std::int32_t>& starts() const { return starts_; }
   int startCount() const { return start_count_; }
 

@@ -9,7 +9,7 @@
 
 namespace disparity_refinement {
 
-/// Throws std::invalid_argument unless max_lambda >= 0 and 0 <= max_h <= 255.
+/// Throws std::invalid_argument unless 0 <= max_lambda <= CountSurface::MAX_LAMBDA and 0 <= max_h <= 255.
 void validateSurface(int max_lambda, int max_h);
 
 /// Counts the regional minima that area closing and H-minima leave of an image f, for all lambda and h at
@@ -24,8 +24,10 @@ void validateSurface(int max_lambda, int max_h);
 /// Takes as many bytes as basins times max_lambda. Buffers are kept between images.
 class CountSurface {
  public:
+  static constexpr int MAX_LAMBDA = 1000;
+
   /// @param pixels      Number of pixels of the image.
-  /// @param max_lambda  Largest lambda [px], >= 0.
+  /// @param max_lambda  Largest lambda [px], 0...MAX_LAMBDA.
   /// @param max_h       Largest h [gray levels], 0...255.
   /// @return            N, CV_32SC1: rows lambda = 0 ... max_lambda, columns h = 0 ... max_h.
   /// @throws std::invalid_argument  for max_lambda or max_h out of range.
@@ -35,9 +37,9 @@ class CountSurface {
   template <typename Index>
   void merge(const Basins& basins, const Index* pixels);
   void unite(std::int32_t a, std::int32_t b, int level);
-  /// The levels t_a of a set of basins, for a = 1 ... largest_area_; they are known up to its area.
+  /// The levels t_a of a set of basins, for a = 1 ... largest_area_ from index 0 on; known up to its area.
   std::uint8_t* levelsOf(std::int32_t set) {
-    return levels_.data() + static_cast<std::size_t>(set) * largest_area_ - 1;
+    return levels_.data() + static_cast<std::size_t>(set) * largest_area_;
   }
 
   std::int32_t largest_area_ = 0;

@@ -16,7 +16,8 @@ namespace disparity_refinement {
 /// Area closing, H-minima and LC-WT of an 8-bit image, in this order: see BasinFilter and Watershed.
 ///
 /// The time is linear in the number of pixels and hardly depends on lambda and h. Buffers are kept between
-/// images, about 15 bytes a pixel; one object serves one thread at a time.
+/// images: about 15 bytes a pixel for what cameras see, up to 36 for noise and patterns of single pixels,
+/// which have more basins. One object serves one thread at a time.
 class FilteredWatershed {
  public:
   static constexpr int MAX_STRIPS = 64;
@@ -25,9 +26,10 @@ class FilteredWatershed {
   ///                the result is the same. Throws std::invalid_argument unless 1...MAX_STRIPS.
   explicit FilteredWatershed(int strips = 1);
 
-  /// The image, CV_8UC1 of this size, for the caller to fill: it lies where compute() needs it.
+  /// The image, CV_8UC1 of this size, for the caller to fill in place: it lies where compute() needs it.
+  /// Valid until the next call with another size.
   /// @throws std::invalid_argument  for an image that is empty or too large for 32-bit indices.
-  cv::Mat& image(const cv::Size& size);
+  cv::Mat image(const cv::Size& size);
 
   /// Segments the image.
   /// @param lambda  Smallest area of a component that stays [px], >= 0; 0 and 1 close nothing.
@@ -41,13 +43,17 @@ class FilteredWatershed {
   /// n for lambda = 0 ... max_lambda (rows) and h = 0 ... max_h (columns): see CountSurface.
   cv::Mat countSurface(int max_lambda, int max_h, Connectivity connectivity);
 
-  const cv::Mat& image() const { return image_; }
-  /// The image after both filters, CV_8UC1, valid from compute() to the next call.
-  const cv::Mat& filtered() const { return filtered_; }
+  /// The image, and what it is after both filters, CV_8UC1; not to be written. Valid from compute() to the
+  /// next call.
+  cv::Mat image() const { return view(cells_); }
+  cv::Mat filtered() const { return view(filtered_cells_); }
 
  private:
   void buildBasins(Connectivity connectivity);
   void applyFilter(cv::Range cells);
+  cv::Mat view(const std::vector<std::uint8_t>& cells) const {
+    return grid_.image(const_cast<std::uint8_t*>(cells.data()));
+  }
 
   int strips_;
   CellGrid grid_;
@@ -57,7 +63,6 @@ class FilteredWatershed {
   CountSurface surface_;
   CellBuffers buffers_;
   std::vector<std::uint8_t> cells_, filtered_cells_;
-  cv::Mat image_, filtered_;  // Their pixels.
 };
 
 }  // namespace disparity_refinement

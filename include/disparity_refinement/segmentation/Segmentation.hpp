@@ -42,8 +42,8 @@ class Segmentation {
                        int max_h);
 
   /// Intermediate results of the last compute(), CV_8UC1, valid until the next call.
-  const cv::Mat& gradient() const { return watershed_.image(); }
-  const cv::Mat& filtered() const { return watershed_.filtered(); }
+  cv::Mat gradient() const { return watershed_.image(); }
+  cv::Mat filtered() const { return watershed_.filtered(); }
 
  private:
   void computeGradient(const cv::Mat& gray, const SegmentationParameters& parameters);

@@ -12,8 +12,6 @@
 namespace disparity_refinement {
 namespace straightforward {
 
-/// Throws std::invalid_argument unless lambda >= 0 and 0 <= h <= 255.
-
 /// Min-tree of an 8-bit image: one node for every connected component of every lower level set {f <= t} in
 /// which a pixel of value t lies; its parent is the next larger component that holds it.
 ///
