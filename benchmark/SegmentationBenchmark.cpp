@@ -41,7 +41,8 @@ void registerFilteredWatershed(const std::string& set, const std::string& name, 
                                int threads) {
   registerBenchmark(set, name, threads, [connectivity, threads](const Frame& frame) {
     FilteredWatershed watershed(threads);
-    Gradient().compute(frame.left, {}, watershed.image(frame.left.size()));
+    cv::Mat image = watershed.image(frame.left.size());
+    Gradient().compute(frame.left, {}, image);
     return [connectivity, watershed = std::move(watershed), labels = cv::Mat()]() mutable {
       watershed.compute(30, 5, connectivity, labels);
     };
