@@ -1,8 +1,8 @@
 // Runs one stage on one frame and nothing else, for what counts instructions, and prints the memory it keeps.
 //
-//   run_stage prepare SET FOLDER        writes the first frame of a set (see Frames.hpp) as left.png,
-//   disparity.png run_stage segmentation FOLDER N     segments it N times run_stage refinement FOLDER N
-//   segments it once and refines its disparity N times
+// - run_stage prepare SET FOLDER writes the first frame of a set (see Frames.hpp) as left.png, disparity.png.
+// - run_stage segmentation FOLDER N segments it N times.
+// - run_stage refinement FOLDER N segments it once and refines its disparity N times.
 
 #include <malloc.h>
 

@@ -184,7 +184,7 @@ void PlaneRefinement::refine(const cv::Mat& disparity, const cv::Mat& labels, co
   const int threads = std::max(1, cv::getNumThreads());
   forEachStrip(threads,
                [&](int i) { copyValid(disparity, range, stripOf(disparity.rows, i, threads), refined); });
-  growTo(planes_, segments_.size());
+  growTo(planes_, segments_.size());  // Room for more, but no more planes than segments.
   planes_.resize(segments_.size());
   const Reprojection reprojection(range, focal_length_times_baseline, parameters);
   // More strips than threads, for the segments differ in size.

@@ -1,8 +1,6 @@
 #include "disparity_refinement/segmentation/BasinFilter.hpp"
 
 #include <algorithm>
-#include <numeric>
-#include <utility>
 
 #include "disparity_refinement/arguments.hpp"
 #include "disparity_refinement/buffers.hpp"
@@ -14,21 +12,17 @@ void validateFilter(int lambda, int h) {
   requireArgument(h >= 0 && h <= 255, "h", h, "0...255");
 }
 
-int BasinFilter::run(const Basins& basins, const CellBuffers& buffers, const std::uint8_t* image, int pixels,
-                     int lambda, int h) {
+int BasinFilter::run(const Basins& basins, const CellBuffers& buffers, int lambda, int h) {
   validateFilter(lambda, h);
   // The whole image reaches any area, and a component has one pixel at least.
-  lambda_ = std::min(std::max(lambda, 1), pixels);
+  lambda_ = std::min(std::max(lambda, 1), basins.pixelCount());
   h_ = h;
 
   const std::size_t size = basins.size();
-  growTo(set_of_, size);
-  growTo(next_in_set_, size);
+  sets_.reset(size);
   growTo(areas_, size);
   growTo(reached_, size);
   growTo(results_, size);
-  std::iota(set_of_.begin(), set_of_.begin() + size, 0);
-  std::iota(next_in_set_.begin(), next_in_set_.begin() + size, 0);
   std::fill_n(reached_.begin(), size, NEVER);
   std::fill_n(areas_.begin(), size, 0);
   std::fill_n(results_.begin(), size, Result{NONE, Basins::SUMMIT_LEVEL});
@@ -40,7 +34,7 @@ int BasinFilter::run(const Basins& basins, const CellBuffers& buffers, const std
   const int minima =
       basins.visitPixels(buffers, [&](const auto* of_pixel) { return merge(basins, of_pixel); });
   if (minima > 0) {
-    numberMinima(basins, buffers, image, minima);
+    numberMinima(basins, buffers, minima);
     return minima;
   }
   // Only the whole image becomes live, at level 255.
@@ -51,7 +45,7 @@ int BasinFilter::run(const Basins& basins, const CellBuffers& buffers, const std
 template <typename Index>
 int BasinFilter::merge(const Basins& basins, const Index* pixels) {
   // Locals: the compiler need not look whether the areas written are members.
-  const std::int32_t* set_of = set_of_.data();
+  const std::int32_t* set_of = sets_.names();
   std::int32_t* areas = areas_.data();
   const int lambda = lambda_;
   int minima = 0;
@@ -89,13 +83,7 @@ void BasinFilter::meet(std::int32_t a, std::int32_t b, int level) {
 }
 
 void BasinFilter::unite(std::int32_t larger, std::int32_t smaller, int level) {
-  std::int32_t basin = smaller;
-  do {
-    set_of_[basin] = larger;
-    basin = next_in_set_[basin];
-  } while (basin != smaller);
-  std::swap(next_in_set_[larger], next_in_set_[smaller]);  // Two rings become one.
-
+  sets_.join(larger, smaller);
   areas_[larger] += areas_[smaller];
   if (reached_[smaller] < reached_[larger]) {
     // The smaller one is a candidate already, and is called `larger` from here on.
@@ -115,17 +103,11 @@ void BasinFilter::reachLambda(std::int32_t set, int level) {
 }
 
 void BasinFilter::enliven(std::int32_t set, Result result) {
-  std::int32_t basin = set;
-  do {
-    set_of_[basin] = LIVE;
-    results_[basin] = result;
-    basin = next_in_set_[basin];
-  } while (basin != set);
+  sets_.rename(set, LIVE, [&](std::int32_t basin) { results_[basin] = result; });
 }
 
 // The first pixel of a minimum in raster order has no earlier neighbour that is as low: it is a start.
-void BasinFilter::numberMinima(const Basins& basins, const CellBuffers& buffers, const std::uint8_t* image,
-                               int count) {
+void BasinFilter::numberMinima(const Basins& basins, const CellBuffers& buffers, int count) {
   std::int32_t* numbers = areas_.data();  // The areas are not needed any more.
   std::fill_n(numbers, count, NONE);
   int next = 0;
@@ -133,7 +115,7 @@ void BasinFilter::numberMinima(const Basins& basins, const CellBuffers& buffers,
     const std::int32_t cell = basins.starts()[i];
     const Result& result = results_[buffers.ids[cell]];
     if (result.minimum == NONE || numbers[result.minimum] != NONE) continue;
-    if (image[cell] <= result.level) numbers[result.minimum] = next++;
+    if (basins.image()[cell] <= result.level) numbers[result.minimum] = next++;
   }
   for (int basin = 0; basin < basins.size(); ++basin) {
     std::int32_t& minimum = results_[basin].minimum;

@@ -1,8 +1,8 @@
 #include "disparity_refinement/segmentation/Basins.hpp"
 
 #include <algorithm>
-#include <initializer_list>
 #include <opencv2/core/hal/intrin.hpp>
+#include <utility>
 
 #include "disparity_refinement/buffers.hpp"
 #include "disparity_refinement/strips.hpp"
@@ -68,15 +68,6 @@ const LowerSets& lowerSets(Connectivity connectivity) {
   return connectivity == Connectivity::FOUR ? four : eight;
 }
 
-// Turns counts of every level and strip into the places where the first of them goes.
-void accumulate(std::initializer_list<std::int32_t*> counts, int& begin) {
-  for (std::int32_t* count : counts) {
-    const int n = *count;
-    *count = begin;
-    begin += n;
-  }
-}
-
 }  // namespace
 
 void Basins::build(const CellGrid& grid, const std::uint8_t* image, Connectivity connectivity, int strips,
@@ -117,14 +108,10 @@ void Basins::build(const CellGrid& grid, const std::uint8_t* image, Connectivity
   size_ = SUMMIT + 1;
   buffers.forest.resolve([&](std::int32_t cell) { return image[cell] == SUMMIT_LEVEL ? SUMMIT : size_++; });
 
-  int begin = 0;
-  for (int level = 0; level < LEVELS; ++level) {
-    pixel_begin_[level] = begin;
-    for (Strip& strip : strips_) accumulate({&strip.even_pixels[level], &strip.odd_pixels[level]}, begin);
-  }
-  pixel_begin_[LEVELS] = begin;
-  auto* small_pixels = isSmall() ? buffers.scratch.array<std::uint16_t>(begin) : nullptr;
-  auto* pixels = isSmall() ? nullptr : buffers.scratch.array<std::int32_t>(begin);
+  layOutLevels([](Strip& strip) { return std::array{&strip.even_pixels, &strip.odd_pixels}; }, pixel_begin_);
+  const int pixel_count = pixel_begin_.back();
+  auto* small_pixels = isSmall() ? buffers.scratch.array<std::uint16_t>(pixel_count) : nullptr;
+  auto* pixels = isSmall() ? nullptr : buffers.scratch.array<std::int32_t>(pixel_count);
   forEachStrip(strips, [&](int i) {
     const std::int32_t* basin_of_node = buffers.forest.values().data();
     std::int32_t* ids = buffers.ids.data();
@@ -138,13 +125,8 @@ void Basins::build(const CellGrid& grid, const std::uint8_t* image, Connectivity
     counts.fill(0);
     visitSaddles(strips_[i], buffers, [&counts](int level, const Saddle&) { ++counts[level]; });
   });
-  begin = 0;
-  for (int level = 0; level < LEVELS; ++level) {
-    saddle_begin_[level] = begin;
-    for (Strip& strip : strips_) accumulate({&strip.saddles[level]}, begin);
-  }
-  saddle_begin_[LEVELS] = begin;
-  growTo(saddles_, begin);
+  layOutLevels([](Strip& strip) { return std::array{&strip.saddles}; }, saddle_begin_);
+  growTo(saddles_, saddle_begin_.back());
   forEachStrip(strips, [&](int i) {
     Histogram& next = strips_[i].saddles;
     visitSaddles(strips_[i], buffers,
@@ -209,6 +191,18 @@ void Basins::countPixels(Strip& strip) {
     ++even[image[p]];
     ++odd[image[p + 1]];
   }
+}
+
+template <typename CountsOf>
+void Basins::layOutLevels(const CountsOf& counts_of, LevelBegins& begins) {
+  int begin = 0;
+  for (int level = 0; level < LEVELS; ++level) {
+    begins[level] = begin;
+    for (Strip& strip : strips_) {
+      for (Histogram* counts : counts_of(strip)) begin += std::exchange((*counts)[level], begin);
+    }
+  }
+  begins[LEVELS] = begin;
 }
 
 template <typename Index>

@@ -15,17 +15,15 @@ void validateSurface(int max_lambda, int max_h) {
   requireArgument(max_h >= 0 && max_h <= 255, "max_h", max_h, "0...255");
 }
 
-cv::Mat CountSurface::compute(const Basins& basins, const CellBuffers& buffers, int pixels, int max_lambda,
-                              int max_h) {
+cv::Mat CountSurface::compute(const Basins& basins, const CellBuffers& buffers, int max_lambda, int max_h) {
   validateSurface(max_lambda, max_h);
-  // Only the whole image reaches an area of `pixels` or more.
-  largest_area_ = std::min(std::max(max_lambda, 1), pixels);
+  // Only the whole image reaches an area of all its pixels or more.
+  largest_area_ = std::min(std::max(max_lambda, 1), basins.pixelCount());
 
   const std::size_t size = basins.size();
-  for (auto* buffer : {&set_of_, &next_in_set_, &areas_}) growTo(*buffer, size);
+  sets_.reset(size);
+  growTo(areas_, size);
   growTo(levels_, size * largest_area_);
-  std::iota(set_of_.begin(), set_of_.begin() + size, 0);
-  std::iota(next_in_set_.begin(), next_in_set_.begin() + size, 0);
   std::fill_n(areas_.begin(), size, 0);
   growTo(depths_, largest_area_);
   for (int a = 0; a < largest_area_; ++a) depths_[a].fill(0);
@@ -45,35 +43,30 @@ cv::Mat CountSurface::compute(const Basins& basins, const CellBuffers& buffers, 
 
 template <typename Index>
 void CountSurface::merge(const Basins& basins, const Index* pixels) {
+  const std::int32_t* set_of = sets_.names();
   for (int level = 0; level < Basins::SUMMIT_LEVEL; ++level) {
     const cv::Range own_pixels = basins.pixelsOf(level);
     for (int i = own_pixels.start; i < own_pixels.end; ++i) {
-      const std::int32_t set = set_of_[pixels[i]];
+      const std::int32_t set = set_of[pixels[i]];
       const std::int32_t area = ++areas_[set];
       if (area <= largest_area_) levelsOf(set)[area - 1] = static_cast<std::uint8_t>(level);
     }
     const cv::Range saddles = basins.saddlesOf(level);
     for (int i = saddles.start; i < saddles.end; ++i) {
-      const std::int32_t a = set_of_[basins.saddles()[i].a], b = set_of_[basins.saddles()[i].b];
+      const std::int32_t a = set_of[basins.saddles()[i].a], b = set_of[basins.saddles()[i].b];
       if (a != b) unite(a, b, level);
     }
   }
   // At the summit everything meets.
   for (int basin = 0; basin < basins.size(); ++basin) {
-    const std::int32_t all = set_of_[Basins::SUMMIT], set = set_of_[basin];
+    const std::int32_t all = set_of[Basins::SUMMIT], set = set_of[basin];
     if (set != all) unite(all, set, Basins::SUMMIT_LEVEL);
   }
 }
 
 void CountSurface::unite(std::int32_t a, std::int32_t b, int level) {
   if (areas_[a] < areas_[b]) std::swap(a, b);
-  std::int32_t basin = b;
-  do {
-    set_of_[basin] = a;
-    basin = next_in_set_[basin];
-  } while (basin != b);
-  std::swap(next_in_set_[a], next_in_set_[b]);
-
+  sets_.join(a, b);
   std::uint8_t* levels = levelsOf(a);
   const std::uint8_t* others = levelsOf(b);
   const std::int32_t known = std::min(areas_[a], largest_area_),

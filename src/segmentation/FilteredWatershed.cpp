@@ -30,7 +30,7 @@ cv::Mat FilteredWatershed::image(const cv::Size& size) {
 int FilteredWatershed::compute(int lambda, int h, Connectivity connectivity, cv::Mat& labels) {
   validateFilter(lambda, h);
   buildBasins(connectivity);
-  const int count = filter_.run(basins_, buffers_, cells_.data(), grid_.size().area(), lambda, h);
+  const int count = filter_.run(basins_, buffers_, lambda, h);
   forEachStrip(strips_, [&](int i) { applyFilter(grid_.strip(i, strips_)); });
   watershed_.compute(grid_, filtered_cells_.data(), connectivity, count, strips_, buffers_, labels);
   return count;
@@ -39,7 +39,7 @@ int FilteredWatershed::compute(int lambda, int h, Connectivity connectivity, cv:
 cv::Mat FilteredWatershed::countSurface(int max_lambda, int max_h, Connectivity connectivity) {
   validateSurface(max_lambda, max_h);
   buildBasins(connectivity);
-  return surface_.compute(basins_, buffers_, grid_.size().area(), max_lambda, max_h);
+  return surface_.compute(basins_, buffers_, max_lambda, max_h);
 }
 
 void FilteredWatershed::buildBasins(Connectivity connectivity) {

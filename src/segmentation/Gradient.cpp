@@ -6,6 +6,7 @@
 #include <opencv2/core/hal/intrin.hpp>
 
 #include "disparity_refinement/arguments.hpp"
+#include "disparity_refinement/segmentation/branchless.hpp"
 #include "disparity_refinement/strips.hpp"
 
 namespace disparity_refinement {
@@ -112,8 +113,7 @@ void Gradient::computeRows(const cv::Mat& gray, const GradientParameters& parame
       cv::v_store(lit.data(), difference);
       cv::v_store(shadow.data(), stretch ? in_shadow : cv::v_setzero_u8());
       for (int k = 0; k < std::min(LANES, cols - x); ++k) {
-        const std::uint8_t stretched = shadow_table_[lit[k]];
-        out[x + k] = static_cast<std::uint8_t>(lit[k] ^ ((lit[k] ^ stretched) & shadow[k]));
+        out[x + k] = static_cast<std::uint8_t>(select(shadow[k] != 0, shadow_table_[lit[k]], lit[k]));
       }
     }
   }

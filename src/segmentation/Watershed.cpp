@@ -73,12 +73,7 @@ void Watershed::findDirections(int strips, Scratch& scratch) {
   });
   int end = queue_end_[0];
   for (int i = 1; i < strips; ++i) {
-    if (end == queue_begin_[i]) {
-      end = queue_end_[i];
-      continue;
-    }
-    end =
-        static_cast<int>(std::copy(queue_ + queue_begin_[i], queue_ + queue_end_[i], queue_ + end) - queue_);
+    for (int k = queue_begin_[i]; k < queue_end_[i]; ++k) queue_[end++] = queue_[k];
   }
   crossPlateaus<neighbour_count>(end);
 }

@@ -61,39 +61,43 @@ std::vector<int> lambdasFor(const cv::Mat& image) {
   return {0, 1, 2, 3, 5, area - 1, area, area + 1};
 }
 
-TEST(FilteredWatershed, closesAreasLikeThresholdDecomposition) {
-  RandomImages images(2);
+/// Calls check(images, image, connectivity, filter) on 600 images under both connectivities, all through one
+/// filter that was built for the image.
+template <typename Check>
+void forRandomImages(unsigned seed, Check check) {
+  RandomImages images(seed);
   Filter filter;
-  cv::Mat actual;
-  for (int i = 0; i < 600; ++i) {
+  for (int i = 0; i < 600 && !testing::Test::HasFailure(); ++i) {
     const cv::Mat image = images.next();
     for (const Connectivity connectivity : BOTH_CONNECTIVITIES) {
+      SCOPED_TRACE(testing::Message() << "connectivity " << static_cast<int>(connectivity) << ", image\n"
+                                      << image);
       filter.build(image, connectivity);
-      for (const int lambda : lambdasFor(image)) {
-        filter.filter(lambda, 0, actual);
-        ASSERT_TRUE(identical(reference::areaClosing(image, lambda, connectivity), actual))
-            << "lambda " << lambda << " on\n"
-            << image;
-      }
+      check(images, image, connectivity, filter);
     }
   }
 }
 
-TEST(FilteredWatershed, fillsMinimaLikeGeodesicErosion) {
-  RandomImages images(3);
-  Filter filter;
-  cv::Mat actual;
-  for (int i = 0; i < 600; ++i) {
-    const cv::Mat image = images.next();
-    for (const Connectivity connectivity : BOTH_CONNECTIVITIES) {
-      filter.build(image, connectivity);
-      for (const int h : {0, 1, images.uniform(2, 30), images.uniform(31, 254), 255}) {
-        filter.filter(0, h, actual);
-        ASSERT_TRUE(identical(reference::hMinima(image, h, connectivity), actual)) << "h " << h << " on\n"
-                                                                                   << image;
-      }
+TEST(FilteredWatershed, closesAreasLikeThresholdDecomposition) {
+  forRandomImages(2, [](auto&, const cv::Mat& image, Connectivity connectivity, Filter& filter) {
+    cv::Mat actual;
+    for (const int lambda : lambdasFor(image)) {
+      filter.filter(lambda, 0, actual);
+      ASSERT_TRUE(identical(reference::areaClosing(image, lambda, connectivity), actual))
+          << "lambda " << lambda;
     }
-  }
+  });
+}
+
+TEST(FilteredWatershed, fillsMinimaLikeGeodesicErosion) {
+  forRandomImages(3,
+                  [](RandomImages& images, const cv::Mat& image, Connectivity connectivity, Filter& filter) {
+                    cv::Mat actual;
+                    for (const int h : {0, 1, images.uniform(2, 30), images.uniform(31, 254), 255}) {
+                      filter.filter(0, h, actual);
+                      ASSERT_TRUE(identical(reference::hMinima(image, h, connectivity), actual)) << "h " << h;
+                    }
+                  });
 }
 
 TEST(FilteredWatershed, filtersAndCountsLikeTheTwoOperatorsInTheirOrder) {

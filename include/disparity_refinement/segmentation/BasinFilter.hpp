@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "disparity_refinement/segmentation/BasinSets.hpp"
 #include "disparity_refinement/segmentation/Basins.hpp"
 
 namespace disparity_refinement {
@@ -40,14 +41,11 @@ class BasinFilter {
     std::int32_t level;    ///< T
   };
 
-  /// @param pixels  Number of pixels of the image.
   /// @param lambda  Smallest area of a component that stays [px], >= 0; 0 and 1 close nothing.
   /// @param h       Smallest depth of a minimum that stays [gray levels], 0...255; 0 fills nothing.
-  /// @param image   All cells, as for Basins.
   /// @return        Number of regional minima, numbered from 0 in raster order of their first pixels.
   /// @throws std::invalid_argument  for lambda or h out of range.
-  int run(const Basins& basins, const CellBuffers& buffers, const std::uint8_t* image, int pixels, int lambda,
-          int h);
+  int run(const Basins& basins, const CellBuffers& buffers, int lambda, int h);
 
   /// Of every basin after run(), by its number; there may be more behind.
   const std::vector<Result>& results() const { return results_; }
@@ -63,13 +61,12 @@ class BasinFilter {
   void unite(std::int32_t larger, std::int32_t smaller, int level);
   void reachLambda(std::int32_t set, int level);
   void enliven(std::int32_t set, Result result);
-  void numberMinima(const Basins& basins, const CellBuffers& buffers, const std::uint8_t* image, int count);
+  void numberMinima(const Basins& basins, const CellBuffers& buffers, int count);
 
   int lambda_ = 0, h_ = 0;
-  std::vector<std::int32_t> set_of_;       // Of every basin: the name of its set, a basin in it.
-  std::vector<std::int32_t> next_in_set_;  // Of every basin: the basins of a set make a ring.
-  std::vector<std::int32_t> areas_;        // Pixels so far [px], by the name of the set.
-  std::vector<std::int16_t> reached_;      // The level t0, or NEVER, by the name of the set.
+  BasinSets sets_;
+  std::vector<std::int32_t> areas_;    // Pixels so far [px], by the name of the set.
+  std::vector<std::int16_t> reached_;  // The level t0, or NEVER, by the name of the set.
   std::vector<Result> results_;
   // The sets that will be live at a level, unless they meet a live one before: a list for every level. A set
   // may have got another name since.

@@ -13,9 +13,10 @@ namespace disparity_refinement {
 
 /// What the stages of the segmentation write into every cell, one stage after the other.
 struct CellBuffers {
-  std::vector<std::uint8_t>
-      codes;                      ///< Lower neighbours, then whether a cell is in a minimum, then directions.
-  std::vector<std::int32_t> ids;  ///< Nodes, then basins, then labels, then nodes again.
+  /// Lower neighbours, then whether a cell is in a minimum, then directions.
+  std::vector<std::uint8_t> codes;
+  /// Nodes, then basins, then labels, then nodes again.
+  std::vector<std::int32_t> ids;
   PointerForest forest;
   Scratch scratch;
 };
@@ -44,11 +45,15 @@ class Basins {
     std::int32_t a, b;  ///< The two basins that meet.
   };
 
-  /// @param image    All cells of the grid; 255 in its frame.
+  /// @param image    All cells of the grid; 255 in its frame. Not copied.
   /// @param buffers  ids will hold the basin of every cell, scratch the pixels by level, for as long as they
   ///                 are visited.
   void build(const CellGrid& grid, const std::uint8_t* image, Connectivity connectivity, int strips,
              CellBuffers& buffers);
+
+  /// The image of the last build().
+  const std::uint8_t* image() const { return image_; }
+  int pixelCount() const { return grid_.size().area(); }
 
   /// Number of basins, SUMMIT among them.
   int size() const { return size_; }
@@ -74,6 +79,7 @@ class Basins {
 
  private:
   using Histogram = std::array<std::int32_t, LEVELS>;
+  using LevelBegins = std::array<int, LEVELS + 1>;
   /// What a strip adds to the counting sorts: first how many there are of every level, then where the next
   /// one goes. The pixels of even and of odd cells are counted apart, for neighbours often share a level, and
   /// two increments of one number would have to wait for each other.
@@ -86,6 +92,10 @@ class Basins {
   template <int neighbour_count>
   void findLowerNeighbours(cv::Range cells, std::uint8_t* lower);
   void countPixels(Strip& strip);
+  /// Turns the counts of every level into the places where the first ones of a strip go, and notes where the
+  /// levels begin. counts_of(strip) is an array of pointers to the histograms concerned.
+  template <typename CountsOf>
+  void layOutLevels(const CountsOf& counts_of, LevelBegins& begins);
   template <typename Index>
   void sortPixels(Strip& strip, const std::int32_t* basin_of_node, std::int32_t* ids, Index* pixels);
   /// Calls visit(level, saddle) for every saddle of a strip.
@@ -99,7 +109,7 @@ class Basins {
   std::vector<std::uint32_t> critical_;  // A bit for every cell of a block.
   std::vector<std::int32_t> starts_;
   std::vector<Saddle> saddles_;
-  std::array<int, LEVELS + 1> pixel_begin_{}, saddle_begin_{};
+  LevelBegins pixel_begin_{}, saddle_begin_{};
   int size_ = 0, start_count_ = 0;
 };
 

@@ -5,6 +5,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "disparity_refinement/segmentation/BasinSets.hpp"
 #include "disparity_refinement/segmentation/Basins.hpp"
 
 namespace disparity_refinement {
@@ -26,12 +27,11 @@ class CountSurface {
  public:
   static constexpr int MAX_LAMBDA = 1000;
 
-  /// @param pixels      Number of pixels of the image.
   /// @param max_lambda  Largest lambda [px], 0...MAX_LAMBDA.
   /// @param max_h       Largest h [gray levels], 0...255.
   /// @return            N, CV_32SC1: rows lambda = 0 ... max_lambda, columns h = 0 ... max_h.
   /// @throws std::invalid_argument  for max_lambda or max_h out of range.
-  cv::Mat compute(const Basins& basins, const CellBuffers& buffers, int pixels, int max_lambda, int max_h);
+  cv::Mat compute(const Basins& basins, const CellBuffers& buffers, int max_lambda, int max_h);
 
  private:
   template <typename Index>
@@ -43,8 +43,8 @@ class CountSurface {
   }
 
   std::int32_t largest_area_ = 0;
-  std::vector<std::int32_t> set_of_, next_in_set_;  // As in BasinFilter.
-  std::vector<std::int32_t> areas_;                 // Pixels so far [px], by the name of the set.
+  BasinSets sets_;
+  std::vector<std::int32_t> areas_;  // Pixels so far [px], by the name of the set.
   std::vector<std::uint8_t> levels_;
   std::vector<std::array<std::int32_t, Basins::LEVELS>> depths_;  // By area - 1: minima of every depth.
 };

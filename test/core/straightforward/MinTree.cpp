@@ -168,19 +168,6 @@ void MinTree::filter(int lambda, int h, cv::Mat& filtered) const {
   }
 }
 
-int MinTree::countSegments(int lambda, int h) const {
-  validateFilter(lambda, h);
-  requireTree();
-
-  const std::vector<std::uint8_t> lowest = lowestLevels(lambda);
-  int count = 0;
-  for (std::size_t i = 0; i < nodes_.size(); ++i) {
-    const int filled = lowest[i] + h;
-    if (isKept(i, lambda) && nodes_[i].level <= filled && filled < parentLevel(i)) ++count;
-  }
-  return count;
-}
-
 cv::Mat MinTree::countSurface(int max_lambda, int max_h) const {
   requireArgument(max_lambda >= 0, "max_lambda", max_lambda, "at least 0");
   requireArgument(max_h >= 0 && max_h <= 255, "max_h", max_h, "0...255");

@@ -41,24 +41,17 @@ class MinTree {
   /// reused.
   void build(const cv::Mat& image, Connectivity connectivity);
 
-  /// The nodes, children before parents, the root last. Empty before the first build().
-  const std::vector<Node>& nodes() const { return nodes_; }
-
-  /// Area closing, then H-minima. This and the two functions below throw std::invalid_argument if a parameter
-  /// is out of its range or no tree has been built.
+  /// Area closing, then H-minima. This and countSurface throw std::invalid_argument if a parameter is out of
+  /// its range or no tree has been built.
   ///
   /// @param lambda    Smallest area of a component that stays [px], >= 0; 0 and 1 close nothing. Above the
-  /// number of
-  ///                  pixels only the root stays.
+  ///                  number of pixels only the root stays.
   /// @param h         Smallest depth of a minimum that stays [gray levels], 0...255; 0 fills nothing.
   /// @param filtered  CV_8UC1 of the image's size; written in place if it has that type and size already.
   void filter(int lambda, int h, cv::Mat& filtered) const;
 
-  /// Number of regional minima of the image that filter(lambda, h) gives: the segments of its watershed.
-  int countSegments(int lambda, int h) const;
-
-  /// countSegments for lambda = 0...max_lambda (rows) and h = 0...max_h (columns), CV_32SC1: the paper's
-  /// Figure 5.
+  /// Number of regional minima of the image that filter(lambda, h) gives, for lambda = 0...max_lambda (rows)
+  /// and h = 0...max_h (columns), CV_32SC1: the paper's Figure 5.
   cv::Mat countSurface(int max_lambda, int max_h) const;
 
  private:

@@ -17,8 +17,8 @@ namespace straightforward {
 /// their
 ///   first pixel, from 0.
 /// - A pixel with a lower neighbour points to its lowest neighbour. A pixel of a plateau without one points
-/// to a
-///   neighbour on the plateau that is one step nearer to an exit (geodesic distance inside the plateau).
+/// to
+///   a neighbour on the plateau that is one step nearer to an exit (geodesic distance inside the plateau).
 /// - Ties are broken in the order W, E, N, S, NW, NE, SW, SE.
 ///
 /// The definition is local, so the result depends neither on a scan order nor on threads. The time is linear
@@ -26,8 +26,7 @@ namespace straightforward {
 class Watershed {
  public:
   /// @param image   CV_8UC1, not empty; throws std::invalid_argument otherwise.
-  /// @param labels  CV_32SC1 of the same size, 0 ... n - 1; written in place if it has that type and size
-  /// already.
+  /// @param labels  CV_32SC1 of the same size, 0 ... n - 1; written in place if it has that type and size.
   /// @return        n, the number of regional minima.
   int compute(const cv::Mat& image, Connectivity connectivity, cv::Mat& labels);
 
