@@ -11,8 +11,10 @@ namespace {
 
 constexpr int SUBPIXEL_STEPS = cv::StereoMatcher::DISP_SCALE;
 // OpenCV marks a pixel without disparity by its min_disparity - 1; its min_disparity is 0 here, see
-// compute().
+// matchBlocks().
 constexpr short FIXED_POINT_INVALID = -SUBPIXEL_STEPS;
+static_assert(CensusSgm::INVALID == FIXED_POINT_INVALID && CensusSgm::SUBPIXEL_STEPS == SUBPIXEL_STEPS,
+              "all matchers have one fixed point");
 
 void requireInRange(const std::string& name, int value, int min, int max) {
   requireArgument(value >= min && value <= max, name, value,
@@ -24,11 +26,23 @@ void requireOddInRange(const std::string& name, int value, int min, int max) {
                   "an odd number in " + std::to_string(min) + "..." + std::to_string(max));
 }
 
+// Those of SGBM; 0 stands for a multiple of the block's area.
 int penalty(int value, int factor, int window) { return value > 0 ? value : factor * window * window; }
 
 int effectiveP1(const MatchingParameters& p) { return penalty(p.P1, 8, p.correlation_window_size); }
 
 int effectiveP2(const MatchingParameters& p) { return penalty(p.P2, 32, p.correlation_window_size); }
+
+CensusSgmParameters censusParameters(const MatchingParameters& p) {
+  CensusSgmParameters census;
+  census.min_disparity = p.min_disparity;
+  census.disparity_range = p.disparity_range;
+  if (p.P1 > 0) census.p1 = p.P1;
+  if (p.P2 > 0) census.p2 = p.P2;
+  census.uniqueness_ratio = p.uniqueness_ratio;
+  census.disp12_max_diff = p.disp12MaxDiff;
+  return census;
+}
 
 auto members(const MatchingParameters& p) {
   return std::tie(p.stereo_algorithm, p.sgbm_mode, p.prefilter_size, p.prefilter_cap,
@@ -37,7 +51,7 @@ auto members(const MatchingParameters& p) {
                   p.full_width);
 }
 
-cv::Ptr<cv::StereoMatcher> createMatcher(const MatchingParameters& p) {
+cv::Ptr<cv::StereoMatcher> createBlockMatcher(const MatchingParameters& p) {
   if (p.stereo_algorithm == StereoAlgorithm::BM) {
     const cv::Ptr<cv::StereoBM> matcher = cv::StereoBM::create(p.disparity_range, p.correlation_window_size);
     matcher->setPreFilterSize(p.prefilter_size);
@@ -96,8 +110,7 @@ cv::Mat columns(const cv::Mat& image, int first, int width, cv::Mat& buffer) {
 }  // namespace
 
 void validate(const MatchingParameters& p) {
-  requireInRange("stereo_algorithm", static_cast<int>(p.stereo_algorithm), 0, 1);
-  requireInRange("prefilter_cap", p.prefilter_cap, 1, 63);
+  requireInRange("stereo_algorithm", static_cast<int>(p.stereo_algorithm), 0, 2);
   requireInRange("min_disparity", p.min_disparity, -2048, 2048);
   requireArgument(p.disparity_range >= 16 && p.disparity_range <= 2048 && p.disparity_range % 16 == 0,
                   "disparity_range", p.disparity_range, "a multiple of 16 in 16...2048");
@@ -105,6 +118,17 @@ void validate(const MatchingParameters& p) {
   requireArgument(p.speckle_size >= 0, "speckle_size", p.speckle_size, "at least 0");
   requireInRange("speckle_range", p.speckle_range, 0, 4096);
 
+  if (p.stereo_algorithm == StereoAlgorithm::CENSUS_SGM) {
+    requireInRange("disp12MaxDiff", p.disp12MaxDiff, -1, 4096);
+    requireArgument(p.P1 >= 0, "P1", p.P1, "at least 0");
+    requireArgument(p.P2 >= 0, "P2", p.P2, "at least 0");
+    const CensusSgmParameters census = censusParameters(p);
+    requireArgument(census.p2 > census.p1, "P2", census.p2,
+                    "more than P1, which is " + std::to_string(census.p1));
+    validate(census);
+    return;
+  }
+  requireInRange("prefilter_cap", p.prefilter_cap, 1, 63);
   if (p.stereo_algorithm == StereoAlgorithm::BM) {
     requireOddInRange("correlation_window_size", p.correlation_window_size, 5, 255);
     requireOddInRange("prefilter_size", p.prefilter_size, 5, 255);
@@ -125,9 +149,10 @@ StereoMatcher::StereoMatcher(const MatchingParameters& parameters) { setParamete
 
 void StereoMatcher::setParameters(const MatchingParameters& parameters) {
   // A new matcher of OpenCV would allocate its buffers anew.
-  if (matcher_ && members(parameters) == members(parameters_)) return;
+  if (block_matcher_ && members(parameters) == members(parameters_)) return;
   validate(parameters);
-  matcher_ = createMatcher(parameters);
+  block_matcher_ =
+      parameters.stereo_algorithm == StereoAlgorithm::CENSUS_SGM ? nullptr : createBlockMatcher(parameters);
   parameters_ = parameters;
 }
 
@@ -144,8 +169,38 @@ cv::Rect StereoMatcher::validWindow(const cv::Size& size) const {
   // The continued images have no columns without candidates.
   const int min_disparity = p.full_width ? 0 : p.min_disparity;
   const int disparities = p.full_width ? 1 : p.disparity_range;
-  return cv::getValidDisparityROI(image, image, min_disparity, disparities, p.correlation_window_size) &
-         image;
+  const int block =
+      p.stereo_algorithm == StereoAlgorithm::CENSUS_SGM ? CensusPlanes::WIDTH : p.correlation_window_size;
+  return cv::getValidDisparityROI(image, image, min_disparity, disparities, block) & image;
+}
+
+cv::Range StereoMatcher::matchBlocks(const cv::Mat& left, const cv::Mat& right) {
+  requireSearchableSize(left.size(), parameters_);
+  // OpenCV always searches the disparities from 0 on, in images of which the right one is shifted by
+  // min_disparity: its BM writes past the ends of the rows if it is told min_disparity itself.
+  const int first = parameters_.full_width ? -parameters_.disparity_range : parameters_.min_disparity;
+  const int width = parameters_.full_width ? left.cols + parameters_.disparity_range
+                                           : left.cols - std::max(parameters_.min_disparity, 0);
+  block_matcher_->compute(columns(left, first, width, padded_left_),
+                          columns(right, first - parameters_.min_disparity, width, padded_right_),
+                          fixed_point_);
+  return {first, first + width};
+}
+
+cv::Range StereoMatcher::matchCensus(const cv::Mat& left, const cv::Mat& right) {
+  census_matcher_.compute(left, right, censusParameters(parameters_), fixed_point_,
+                          std::max(1, cv::getNumThreads()));
+  if (!parameters_.full_width) {
+    // As OpenCV has it: where not all candidates lie in the right image.
+    const int min = parameters_.min_disparity, end = std::max(min + parameters_.disparity_range, 0);
+    fixed_point_.colRange(0, std::min(end, left.cols)) = FIXED_POINT_INVALID;
+    fixed_point_.colRange(std::max(left.cols + std::min(min, 0), 0), left.cols) = FIXED_POINT_INVALID;
+  }
+  if (parameters_.speckle_size > 0) {
+    cv::filterSpeckles(fixed_point_, FIXED_POINT_INVALID, parameters_.speckle_size,
+                       parameters_.speckle_range * SUBPIXEL_STEPS, speckle_buffer_);
+  }
+  return {0, left.cols};
 }
 
 void StereoMatcher::compute(const cv::Mat& left, const cv::Mat& right, cv::Mat& disparity,
@@ -153,26 +208,20 @@ void StereoMatcher::compute(const cv::Mat& left, const cv::Mat& right, cv::Mat& 
   requireImage(left, "left", CV_8UC1);
   requireImage(right, "right", CV_8UC1, left.size());
   const cv::Size size = left.size();
-  requireSearchableSize(size, parameters_);
-
-  // OpenCV always searches the disparities from 0 on, in images of which the right one is shifted by
-  // min_disparity: its BM writes past the ends of the rows if it is told min_disparity itself.
-  const int first = parameters_.full_width ? -parameters_.disparity_range : parameters_.min_disparity;
-  const int width = parameters_.full_width ? size.width + parameters_.disparity_range
-                                           : size.width - std::max(parameters_.min_disparity, 0);
-  matcher_->compute(columns(left, first, width, padded_left_),
-                    columns(right, first - parameters_.min_disparity, width, padded_right_), fixed_point_);
+  const cv::Range matched = parameters_.stereo_algorithm == StereoAlgorithm::CENSUS_SGM
+                                ? matchCensus(left, right)
+                                : matchBlocks(left, right);
 
   const DisparityRange range = this->range(principal_point_offset);
-  const int begin = std::max(first, 0);
-  const int end = std::min(first + width, size.width);
+  const int begin = std::max(matched.start, 0);
+  const int end = std::min(matched.end, size.width);
   disparity.create(size, CV_32FC1);
   for (int y = 0; y < size.height; ++y) {
     const short* fixed_point = fixed_point_.ptr<short>(y);
     float* row = disparity.ptr<float>(y);
     std::fill(row, row + begin, range.invalid());
     for (int x = begin; x < end; ++x) {
-      const short d = fixed_point[x - first];
+      const short d = fixed_point[x - matched.start];
       row[x] =
           d == FIXED_POINT_INVALID ? range.invalid() : range.min + static_cast<float>(d) / SUBPIXEL_STEPS;
     }

@@ -4,17 +4,19 @@
 #include <opencv2/core.hpp>
 
 #include "disparity_refinement/DisparityRange.hpp"
+#include "disparity_refinement/matching/CensusSgm.hpp"
 
 namespace disparity_refinement {
 
-enum class StereoAlgorithm { BM = 0, SGBM = 1 };
+/// OpenCV's block matching and semi-global block matching, and CensusSgm.
+enum class StereoAlgorithm { BM = 0, SGBM = 1, CENSUS_SGM = 2 };
 
 /// Modes of cv::StereoSGBM, with OpenCV's numbers.
 enum class SgbmMode { SGBM = 0, HH = 1, SGBM_3WAY = 2, HH4 = 3 };
 
-/// Parameters of the block matchers of OpenCV, under the names of stereo_image_proc.
+/// Parameters of the matchers, under the names of stereo_image_proc.
 ///
-/// What belongs to one of the algorithms alone is neither used nor checked with the other one.
+/// What belongs to some of the algorithms alone is neither used nor checked with the others.
 struct MatchingParameters {
   StereoAlgorithm stereo_algorithm = StereoAlgorithm::SGBM;
   /// SGBM only: which paths are aggregated.
@@ -22,10 +24,11 @@ struct MatchingParameters {
   /// BM only: window of the prefilter [px], odd, 5...255. Without effect, as in stereo_image_proc: OpenCV's
   /// default prefilter, x-Sobel, has a fixed window.
   int prefilter_size = 9;
-  /// Bound of the prefiltered values, 1...63.
+  /// BM and SGBM: bound of the prefiltered values, 1...63.
   int prefilter_cap = 63;
-  /// Side of the matched block [px], odd; BM 5...255, SGBM 1...15. Larger: smoother, safer, coarser. OpenCV's
-  /// SGBM sums costs in 16 bits, which do not hold those of larger blocks; it recommends 3...11.
+  /// BM and SGBM: side of the matched block [px], odd; BM 5...255, SGBM 1...15. Larger: smoother, safer,
+  /// coarser. OpenCV's SGBM sums costs in 16 bits, which do not hold those of larger blocks; it
+  /// recommends 3...11.
   int correlation_window_size = 5;
   /// Smallest disparity searched [px], -2048...2048.
   int min_disparity = 0;
@@ -39,24 +42,27 @@ struct MatchingParameters {
   int speckle_size = 100;
   /// Largest disparity step inside a region [px], 0...4096, for both algorithms.
   int speckle_range = 2;
-  /// SGBM only: penalty for a disparity step of 1 px, >= 0; 0: 8 * correlation_window_size^2.
+  /// SGBM and CENSUS_SGM: penalty for a disparity step of 1 px, >= 0; 0: 8 * correlation_window_size^2, with
+  /// CENSUS_SGM 6.
   int P1 = 0;
-  /// SGBM only: penalty for a larger step, greater than P1 and at most 16383, as two of them must fit into 16
-  /// bits; 0: 32 * correlation_window_size^2.
+  /// SGBM and CENSUS_SGM: penalty for a larger step, greater than P1; 0: 32 * correlation_window_size^2, with
+  /// CENSUS_SGM 75. At most 16383, as two of them must fit into 16 bits, with CENSUS_SGM 224: see there.
   int P2 = 0;
-  /// SGBM only: largest difference in the left-right check [px], at most 4096; -1: no check; 0 counts as 1.
+  /// SGBM and CENSUS_SGM: largest difference in the left-right check [px], at most 4096; -1: no check; with
+  /// SGBM 0 counts as 1.
   /// OpenCV's BM has such a check too, but beyond a prefilter_cap of 31 it compares costs that it has not
   /// computed.
   int disp12MaxDiff = 1;
   /// Search up to the left border too. OpenCV leaves the first min_disparity + disparity_range columns empty;
-  /// here both images are reflected at their borders by as many columns before matching.
+  /// here both images are reflected at their borders by as many columns before matching. CENSUS_SGM needs no
+  /// reflection, and the columns are emptied if this is false.
   bool full_width = false;
 };
 
 /// Throws std::invalid_argument that names the parameter, its value and what is expected.
 void validate(const MatchingParameters& parameters);
 
-/// OpenCV's BM and SGBM behind one type. Buffers are kept between frames; one object serves one thread at a
+/// All matchers behind one type. Buffers are kept between frames; one object serves one thread at a
 /// time.
 class StereoMatcher {
  public:
@@ -70,7 +76,8 @@ class StereoMatcher {
   /// by -principal_point_offset.
   DisparityRange range(double principal_point_offset = 0.0) const;
 
-  /// Where the whole block of a pixel and of all its candidates lies inside images of this size.
+  /// Where the whole block of a pixel and of all its candidates lies inside images of this size; the block of
+  /// CENSUS_SGM is that of its census.
   cv::Rect validWindow(const cv::Size& size) const;
 
   /// Disparity map of a rectified pair.
@@ -79,7 +86,7 @@ class StereoMatcher {
   /// are refused: the width must be at least disparity_range + min_disparity + correlation_window_size (for a
   /// negative min_disparity: max(disparity_range, -min_disparity) + correlation_window_size), BM needs more
   /// rows and columns than its window has, and the four stripes of SGBM_3WAY need 4 * ceil((10 / 9) *
-  /// (correlation_window_size / 2 + 1)) - 3 rows.
+  /// (correlation_window_size / 2 + 1)) - 3 rows. CENSUS_SGM takes images of any size.
   ///
   /// @param left, right             CV_8UC1, of the same size.
   /// @param disparity               CV_32FC1 [px], at least one pixel invalid; written in place if it has
@@ -90,9 +97,14 @@ class StereoMatcher {
                double principal_point_offset = 0.0);
 
  private:
+  // Both write fixed_point_ and return the columns of the image that it has.
+  cv::Range matchBlocks(const cv::Mat& left, const cv::Mat& right);
+  cv::Range matchCensus(const cv::Mat& left, const cv::Mat& right);
+
   MatchingParameters parameters_;
-  cv::Ptr<cv::StereoMatcher> matcher_;
-  cv::Mat padded_left_, padded_right_, fixed_point_;
+  cv::Ptr<cv::StereoMatcher> block_matcher_;
+  CensusSgm census_matcher_;
+  cv::Mat padded_left_, padded_right_, fixed_point_, speckle_buffer_;
 };
 
 }  // namespace disparity_refinement
