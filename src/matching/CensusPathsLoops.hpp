@@ -78,7 +78,8 @@ class CensusPathsLoops {
     Vector of[CAPACITY];
 
     void load(const std::uint8_t* bytes, int vectors) {
-      for (int r = 0; r < vectors; ++r) of[r] = Vector::load(bytes + r * N);
+      of[0] = Vector::load(bytes);
+      for (int r = 1; r < vectors; ++r) of[r] = Vector::load(bytes + r * N);
     }
     void store(std::uint8_t* bytes, int vectors) const {
       for (int r = 0; r < vectors; ++r) of[r].store(bytes + r * N);
