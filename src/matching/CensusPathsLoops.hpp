@@ -230,6 +230,8 @@ class CensusPathsLoops {
     right_least.fill(255, vectors);
     right_low.fill(0, vectors);
     right_high.fill(0, vectors);
+    // Before the first disparity there is none, not even where the sum is 255.
+    const Vector has_before = equal(fromLaneBelow(Vector::all(0)), Vector::all(0));
     std::uint8_t low[N], high[N] = {};
     const int last_lane = last_disparity / vectors, last_vector = last_disparity % vectors;
 
@@ -248,7 +250,8 @@ class CensusPathsLoops {
       if (CHECK_UNIQUENESS) {
         const int bound = input.ambiguous[sum];
         const Vector bounds = Vector::all(static_cast<std::uint8_t>(bound));
-        int others = 0;
+        // What fills the vectors is 255.
+        int others = bound < 255 ? 0 : input.disparities - vectors * N;
         for (int r = 0; r < vectors; ++r)
           others += __builtin_popcount(bitsOf(equal(least(s.of[r], bounds), s.of[r])));
         others -= (sum <= bound) + (d > 0 && before <= bound) + (d < last_disparity && after <= bound);
@@ -259,8 +262,8 @@ class CensusPathsLoops {
 
       // The same right pixel is one disparity further than at x - 1.
       const Vector first_least = fromLaneBelow(right_least.of[last]);
-      const Vector first_low = fromLaneBelow(right_low.of[last]);
-      const Vector first_high = IS_SMALL ? first_low : fromLaneBelow(right_high.of[last]);
+      const Vector first_low = both(fromLaneBelow(right_low.of[last]), has_before);
+      const Vector first_high = IS_SMALL ? first_low : both(fromLaneBelow(right_high.of[last]), has_before);
       for (int r = last; r >= 0; --r) {
         const Vector old_least = r > 0 ? right_least.of[r - 1] : first_least;
         const Vector new_least = least(old_least, s.of[r]);
