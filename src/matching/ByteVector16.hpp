@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <opencv2/core.hpp>  // What intrin.hpp needs where it emulates vectors.
 #include <opencv2/core/hal/intrin.hpp>
 
 namespace disparity_refinement {
