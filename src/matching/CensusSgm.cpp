@@ -97,8 +97,8 @@ void CensusSgm::mirror(const cv::Mat (&planes)[3], int min_disparity, int thread
     }
   };
   const cv::Size size = planes[0].size();
-  const std::vector<std::uint8_t> inside(size.width, 255);
-  fill(inside.data(), size.width, inside_.ptr<std::uint8_t>());
+  row_inside_.assign(size.width, 255);
+  fill(row_inside_.data(), size.width, inside_.ptr<std::uint8_t>());
   forEachStrip(threads, [&](int i) {
     const cv::Range rows = stripOf(size.height, i, threads);
     for (int y = rows.start; y < rows.end; ++y) {

@@ -79,7 +79,7 @@ class CensusSgm {
   CensusPlanes left_, right_;
   int vectors_ = 0;
   cv::Mat mirrored_[3], inside_;
-  std::vector<std::uint8_t> beyond_, low_bytes_, high_bytes_;
+  std::vector<std::uint8_t> row_inside_, beyond_, low_bytes_, high_bytes_;
   std::vector<std::uint16_t> place_;
   std::vector<std::uint8_t> ambiguous_;
   cv::Mat states_;  // Of the path from below, where it enters the blocks of rows.
