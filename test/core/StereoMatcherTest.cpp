@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <functional>
+#include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <ostream>
 #include <stdexcept>
@@ -46,14 +47,16 @@ struct Method {
   SgbmMode mode;
 };
 
-const std::vector<Method> METHODS = {{StereoAlgorithm::BM, SgbmMode::SGBM},
-                                     {StereoAlgorithm::SGBM, SgbmMode::SGBM},
-                                     {StereoAlgorithm::SGBM, SgbmMode::HH},
-                                     {StereoAlgorithm::SGBM, SgbmMode::SGBM_3WAY},
-                                     {StereoAlgorithm::SGBM, SgbmMode::HH4}};
+const std::vector<Method> METHODS = {
+    {StereoAlgorithm::BM, SgbmMode::SGBM},  {StereoAlgorithm::SGBM, SgbmMode::SGBM},
+    {StereoAlgorithm::SGBM, SgbmMode::HH},  {StereoAlgorithm::SGBM, SgbmMode::SGBM_3WAY},
+    {StereoAlgorithm::SGBM, SgbmMode::HH4}, {StereoAlgorithm::CENSUS_SGM, SgbmMode::SGBM_3WAY}};
+/// Those of OpenCV.
+const std::vector<Method> OPENCV_METHODS(METHODS.begin(), METHODS.end() - 1);
 
 std::ostream& operator<<(std::ostream& stream, const Method& method) {
   if (method.algorithm == StereoAlgorithm::BM) return stream << "BM";
+  if (method.algorithm == StereoAlgorithm::CENSUS_SGM) return stream << "census SGM";
   return stream << "SGBM mode " << static_cast<int>(method.mode);
 }
 
@@ -77,7 +80,7 @@ double shareOfRight(const cv::Mat& map, const std::function<double(int)>& of, do
 
 double shareOfRight(const cv::Mat& map, double disparity) {
   return shareOfRight(
-      map, [disparity](int) { return disparity; }, 0.25);
+      map, [disparity](int) { return disparity; }, 0.34);
 }
 
 /// The part of a map where BM, too, can have a disparity.
@@ -130,7 +133,7 @@ TEST(StereoMatcher, equalsOpenCvWhereThatSearchesFromZero) {
   cv::Mat noise(pair.right.size(), CV_8UC1);
   cv::RNG(11).fill(noise, cv::RNG::UNIFORM, 0, 6);
   pair.right += noise;
-  for (const Method& method : METHODS) {
+  for (const Method& method : OPENCV_METHODS) {
     MatchingParameters p = parametersOf(method);
     p.prefilter_cap = 21;
     p.uniqueness_ratio = 30;
@@ -158,6 +161,40 @@ TEST(StereoMatcher, equalsOpenCvWhereThatSearchesFromZero) {
     StereoMatcher(p).compute(pair.left, pair.right, map);
     EXPECT_TRUE(sameBits(map, expected)) << method;
   }
+}
+
+TEST(StereoMatcher, equalsTheCensusMatcherAndTheSpeckleFilter) {
+  StereoPair pair = texturedPair({200, 60}, [](int y) { return 2.0 + 0.5 * y; });
+  cv::Mat noise(pair.right.size(), CV_8UC1);
+  cv::RNG(11).fill(noise, cv::RNG::UNIFORM, 0, 60);
+  pair.right += noise;
+  CensusSgmParameters census;
+  census.min_disparity = -3;
+  census.disparity_range = 48;
+  census.p1 = 9;
+  census.p2 = 50;
+  census.uniqueness_ratio = 20;
+  census.disp12_max_diff = 2;
+  cv::Mat fixed_point, expected, map, buffer;
+  CensusSgm().compute(pair.left, pair.right, census, fixed_point);
+  cv::filterSpeckles(fixed_point, CensusSgm::INVALID, 40, 3 * CensusSgm::SUBPIXEL_STEPS, buffer);
+  fixed_point.convertTo(expected, CV_32F, 1.0 / CensusSgm::SUBPIXEL_STEPS, -3);
+
+  MatchingParameters p = parametersOf(METHODS.back());
+  p.min_disparity = -3;
+  p.disparity_range = 48;
+  p.P1 = 9;
+  p.P2 = 50;
+  p.uniqueness_ratio = 20;
+  p.disp12MaxDiff = 2;
+  p.speckle_size = 40;
+  p.speckle_range = 3;
+  p.full_width = true;
+  StereoMatcher(p).compute(pair.left, pair.right, map);
+  EXPECT_TRUE(sameBits(map, expected));
+  const auto valid = static_cast<std::size_t>(cv::countNonZero(map >= -3.0F));
+  EXPECT_GT(valid, map.total() / 10);
+  EXPECT_LT(valid, map.total() * 9 / 10);
 }
 
 TEST(StereoMatcher, findsDisparitiesFromMinDisparityOn) {
@@ -282,21 +319,24 @@ TEST(StereoMatcher, everyPixelIsInvalidOrInRange) {
 }
 
 TEST(StereoMatcher, keepsOneInvalidPixelInAFullMap) {
-  const StereoPair pair = texturedPair({120, 40}, 3);
-  MatchingParameters p;
-  p.sgbm_mode = SgbmMode::SGBM;
-  p.disparity_range = 16;
-  p.uniqueness_ratio = 0;
-  p.speckle_size = 0;
-  p.disp12MaxDiff = -1;
-  p.full_width = true;
-  cv::Mat map;
-  StereoMatcher(p).compute(pair.left, pair.right, map);
-  EXPECT_EQ(cv::countNonZero(map == -1.0F), 1);
-  EXPECT_EQ(map.at<float>(0, 0), -1.0F);
+  const StereoPair pair = texturedPair({120, 40}, 0);
+  for (const StereoAlgorithm algorithm : {StereoAlgorithm::SGBM, StereoAlgorithm::CENSUS_SGM}) {
+    MatchingParameters p;
+    p.stereo_algorithm = algorithm;
+    p.sgbm_mode = SgbmMode::SGBM;
+    p.disparity_range = 16;
+    p.uniqueness_ratio = 0;
+    p.speckle_size = 0;
+    p.disp12MaxDiff = -1;
+    p.full_width = true;
+    cv::Mat map;
+    StereoMatcher(p).compute(pair.left, pair.right, map);
+    EXPECT_EQ(cv::countNonZero(map == -1.0F), 1);
+    EXPECT_EQ(map.at<float>(0, 0), -1.0F);
+  }
 }
 
-TEST(StereoMatcher, speckleRangeIsInPixelsForBothAlgorithms) {
+TEST(StereoMatcher, speckleRangeIsInPixelsForAllAlgorithms) {
   // A patch 4 px nearer than its surroundings: a region of its own unless such steps are allowed.
   StereoPair pair = texturedPair({200, 60}, 20);
   const StereoPair near = texturedPair({200, 60}, 24);
@@ -305,6 +345,8 @@ TEST(StereoMatcher, speckleRangeIsInPixelsForBothAlgorithms) {
   for (const Method& method : METHODS) {
     MatchingParameters p = parametersOf(method);
     p.correlation_window_size = 5;
+    // Otherwise CENSUS_SGM would take the step in several smaller ones.
+    if (method.algorithm == StereoAlgorithm::CENSUS_SGM) p.P1 = 60;
     p.speckle_size = 600;
     const auto patchPixels = [&p, &pair, &patch](int speckle_range) {
       p.speckle_range = speckle_range;
@@ -317,7 +359,7 @@ TEST(StereoMatcher, speckleRangeIsInPixelsForBothAlgorithms) {
   }
 }
 
-TEST(StereoMatcher, minusOneSwitchesTheLeftRightCheckOfSgbmOff) {
+TEST(StereoMatcher, minusOneSwitchesTheLeftRightCheckOff) {
   // A near patch hides some of the far texture from the right camera: matches there contradict the right
   // view.
   const StereoPair far = texturedPair({240, 60}, 10), near = texturedPair({240, 60}, 34);
@@ -411,6 +453,12 @@ TEST(StereoMatcher, validWindowLeavesOutWhatLacksCandidates) {
   EXPECT_EQ(StereoMatcher(parameters).validWindow(size), cv::Rect(65, 2, 133, 96));
   parameters.full_width = true;
   EXPECT_EQ(StereoMatcher(parameters).validWindow(size), cv::Rect(2, 2, 196, 96));
+  // The window of the census is 9 px wide, whatever the block is.
+  parameters.stereo_algorithm = StereoAlgorithm::CENSUS_SGM;
+  EXPECT_EQ(StereoMatcher(parameters).validWindow(size), cv::Rect(4, 4, 192, 92));
+  parameters.full_width = false;
+  EXPECT_EQ(StereoMatcher(parameters).validWindow(size), cv::Rect(67, 4, 129, 92));
+  EXPECT_EQ(StereoMatcher(parameters).validWindow({40, 3}).area(), 0);
 }
 
 TEST(StereoMatcher, refusedParametersLeaveTheFormerOnes) {
@@ -430,7 +478,7 @@ TEST(StereoMatcher, refusedParametersLeaveTheFormerOnes) {
 
 TEST(StereoMatcher, worksAtTheSmallestSizesItAccepts) {
   // One row and one column less are refused: there OpenCV accesses memory that is not the image's.
-  for (const Method& method : METHODS) {
+  for (const Method& method : OPENCV_METHODS) {
     for (const int window : {5, 11}) {
       const bool bm = method.algorithm == StereoAlgorithm::BM;
       const int stripes_height = window == 5 ? 13 : 25;  // stripes of 4 and 7 rows
@@ -464,6 +512,30 @@ TEST(StereoMatcher, worksAtTheSmallestSizesItAccepts) {
                              ", expected at least " + std::to_string(height)),
                     std::string::npos)
               << low;
+        }
+      }
+    }
+  }
+}
+
+TEST(StereoMatcher, censusSgmTakesImagesOfAnySize) {
+  MatchingParameters p = parametersOf(METHODS.back());
+  StereoMatcher matcher;
+  for (const int min_disparity : {-80, -5, 0, 5}) {
+    for (const bool full_width : {false, true}) {
+      p.min_disparity = min_disparity;
+      p.full_width = full_width;
+      matcher.setParameters(p);
+      for (const cv::Size& size : {cv::Size(1, 1), cv::Size(1, 40), cv::Size(58, 2)}) {
+        const StereoPair pair = texturedPair(size, 0);
+        cv::Mat map;
+        matcher.compute(pair.left, pair.right, map);
+        ASSERT_EQ(map.size(), size);
+        const float invalid = matcher.range().invalid();
+        const int valid = static_cast<int>(map.total()) - cv::countNonZero(map == invalid);
+        EXPECT_EQ(cv::countNonZero(map >= matcher.range().min), valid) << size;
+        if (!full_width) {
+          EXPECT_EQ(valid, 0) << size << ": no column has all candidates";
         }
       }
     }
@@ -542,16 +614,19 @@ void expectLimits(const MatchingParameters& base, const std::vector<Limits>& lim
 
 TEST(MatchingParameters, defaultsAreValid) { EXPECT_NO_THROW(validate(MatchingParameters())); }
 
-TEST(MatchingParameters, limitsOfBothAlgorithms) {
+TEST(MatchingParameters, limitsOfAllAlgorithms) {
   for (const Method& method : METHODS) {
     expectLimits(
         parametersOf(method),
-        {{"prefilter_cap", &MatchingParameters::prefilter_cap, {1, 63}, {0, 64}},
-         {"min_disparity", &MatchingParameters::min_disparity, {-2048, 2048}, {-2049, 2049}},
+        {{"min_disparity", &MatchingParameters::min_disparity, {-2048, 2048}, {-2049, 2049}},
          {"disparity_range", &MatchingParameters::disparity_range, {16, 32, 2048}, {0, 8, 24, 2064, -16}},
          {"uniqueness_ratio", &MatchingParameters::uniqueness_ratio, {0, 99}, {-1, 100}},
          {"speckle_size", &MatchingParameters::speckle_size, {0, 100000}, {-1}},
          {"speckle_range", &MatchingParameters::speckle_range, {0, 4096}, {-1, 4097}}});
+  }
+  for (const Method& method : OPENCV_METHODS) {
+    expectLimits(parametersOf(method),
+                 {{"prefilter_cap", &MatchingParameters::prefilter_cap, {1, 63}, {0, 64}}});
   }
 }
 
@@ -572,6 +647,18 @@ TEST(MatchingParameters, limitsOfSgbm) {
        {"P2", &MatchingParameters::P2, {0, 201, 16383}, {-1, 200, 16384}},
        {"disp12MaxDiff", &MatchingParameters::disp12MaxDiff, {-1, 0, 4096}, {-2, 4097}},
        {"texture_threshold", &MatchingParameters::texture_threshold, {-1, 10001}, {}}});  // BM's
+}
+
+TEST(MatchingParameters, limitsOfCensusSgm) {
+  expectLimits(parametersOf(METHODS.back()),
+               {{"P1", &MatchingParameters::P1, {0, 1, 74}, {-1}},
+                {"P2", &MatchingParameters::P2, {0, 7, 224}, {-1, 6, 225, 16383}},
+                {"disp12MaxDiff", &MatchingParameters::disp12MaxDiff, {-1, 0, 4096}, {-2, 4097}},
+                // Those of OpenCV's matchers.
+                {"correlation_window_size", &MatchingParameters::correlation_window_size, {-1, 4, 257}, {}},
+                {"prefilter_size", &MatchingParameters::prefilter_size, {4}, {}},
+                {"prefilter_cap", &MatchingParameters::prefilter_cap, {0, 64}, {}},
+                {"texture_threshold", &MatchingParameters::texture_threshold, {-1}, {}}});
 }
 
 TEST(MatchingParameters, penaltiesOfZeroComeFromTheWindow) {
@@ -595,10 +682,28 @@ TEST(MatchingParameters, penaltiesOfZeroComeFromTheWindow) {
   EXPECT_TRUE(sameBits(map, expected));
 }
 
+TEST(MatchingParameters, penaltiesOfZeroAreThoseOfTheCensusMatcher) {
+  MatchingParameters p = parametersOf(METHODS.back());
+  p.P1 = 75;
+  EXPECT_EQ(errorOf([&p] { validate(p); }), "P2 is 75, expected more than P1, which is 75");
+  p.P1 = 0;
+  p.P2 = 6;
+  EXPECT_EQ(errorOf([&p] { validate(p); }), "P2 is 6, expected more than P1, which is 6");
+
+  const StereoPair pair = texturedPair({160, 40}, [](int y) { return 5.0 + 0.7 * y; });
+  p.P1 = 6;
+  p.P2 = 75;
+  cv::Mat expected, map;
+  StereoMatcher(p).compute(pair.left, pair.right, expected);
+  p.P1 = p.P2 = 0;
+  StereoMatcher(p).compute(pair.left, pair.right, map);
+  EXPECT_TRUE(sameBits(map, expected));
+}
+
 TEST(MatchingParameters, unknownAlgorithmsAreRefused) {
   MatchingParameters p;
-  p.stereo_algorithm = static_cast<StereoAlgorithm>(2);
-  EXPECT_EQ(errorOf([&p] { validate(p); }), "stereo_algorithm is 2, expected 0...1");
+  p.stereo_algorithm = static_cast<StereoAlgorithm>(3);
+  EXPECT_EQ(errorOf([&p] { validate(p); }), "stereo_algorithm is 3, expected 0...2");
   p.stereo_algorithm = StereoAlgorithm::SGBM;
   p.sgbm_mode = static_cast<SgbmMode>(4);
   EXPECT_EQ(errorOf([&p] { validate(p); }), "sgbm_mode is 4, expected 0...3");
