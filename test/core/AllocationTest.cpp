@@ -100,6 +100,29 @@ TEST_F(Allocation, ofTheSegmentationIsAtMost36BytesAPixelForNoiseAndPatterns) {
   }
 }
 
+TEST_F(Allocation, isDoneByTheCensusMatcherForTheFirstFrameOnly) {
+  const std::vector<StreetFrame> frames = streetFrames(3);
+  for (const int disparity_range : {128, 80}) {
+    for (const bool full_width : {true, false}) {
+      MatchingParameters parameters;
+      parameters.stereo_algorithm = StereoAlgorithm::CENSUS_SGM;
+      parameters.disparity_range = disparity_range;
+      parameters.full_width = full_width;
+      StereoMatcher matcher(parameters);
+      cv::Mat disparity(frames[0].left.size(), CV_32FC1);
+      matcher.compute(frames[0].left, frames[0].right, disparity);
+      for (const StreetFrame& frame : frames) {
+        startCounting();
+        matcher.compute(frame.left, frame.right, disparity);
+        // cv::Mat::setTo() with a mask takes a kilobyte for itself.
+        const Allocations allocations = stopCounting();
+        EXPECT_LE(allocations.count, 1) << disparity_range << ", full_width " << full_width;
+        EXPECT_EQ(0, allocations.growth);
+      }
+    }
+  }
+}
+
 TEST_F(Allocation, isDoneByThePlaneRefinementForTheFirstFramesOnly) {
   const std::vector<StreetFrame> frames = streetFrames(4);
   StereoMatcher matcher;
