@@ -8,6 +8,8 @@
 namespace disparity_refinement {
 namespace {
 
+constexpr int MAX_CENSUS_P2 = 224;  // See CensusSgmParameters.
+
 int nextOdd(int value) { return value | 1; }
 
 /// The value as a number, or NaN if it is none.
@@ -45,6 +47,10 @@ MatchingParameters toParameters(DisparityConfig& config) {
   config.correlation_window_size =
       std::clamp(config.correlation_window_size, is_bm ? 5 : 1, is_bm ? 255 : 15);
   config.disparity_range = config.disparity_range / 16 * 16;
+  if (config.stereo_algorithm == static_cast<int>(StereoAlgorithm::CENSUS_SGM)) {
+    config.P1 = std::min(config.P1, MAX_CENSUS_P2 - 1);
+    config.P2 = std::min(config.P2, MAX_CENSUS_P2);
+  }
 
   MatchingParameters parameters;
   parameters.stereo_algorithm = static_cast<StereoAlgorithm>(config.stereo_algorithm);

@@ -227,6 +227,7 @@ void StageParameters::readOptions(const po::variables_map& options) {
 
 std::string matcherName(const MatchingParameters& parameters) {
   if (parameters.stereo_algorithm == StereoAlgorithm::BM) return "BM";
+  if (parameters.stereo_algorithm == StereoAlgorithm::CENSUS_SGM) return "census SGM";
   switch (parameters.sgbm_mode) {
     case SgbmMode::SGBM:
       return "SGBM";

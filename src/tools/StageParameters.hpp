@@ -57,7 +57,7 @@ class StageParameters {
   PlaneRefinementConfig plane_refinement_ = PlaneRefinementConfig::__getDefault__();
 };
 
-/// "SGBM", "HH" or the like for SGBM's modes, "BM".
+/// "BM", "SGBM", "SGBM HH" or the like for SGBM's modes, "census SGM".
 std::string matcherName(const MatchingParameters& parameters);
 
 }  // namespace disparity_refinement

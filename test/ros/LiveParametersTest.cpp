@@ -64,7 +64,7 @@ TEST(LiveParameters, refinementDefaultsAreThoseOfTheCore) {
 
 TEST(LiveParameters, everyCornerOfTheConfigurationIsValid) {
   for (DisparityConfig config : {DisparityConfig::__getMin__(), DisparityConfig::__getMax__()}) {
-    for (int algorithm : {0, 1}) {
+    for (int algorithm : {0, 1, 2}) {
       config.stereo_algorithm = algorithm;
       config.P1 = config.P2 = 0;  // P1 < P2 is the one condition that no single value can be blamed for
       EXPECT_NO_THROW(validate(toParameters(config)));
@@ -93,10 +93,29 @@ TEST(LiveParameters, valuesBetweenTheAllowedOnesAreReplaced) {
   disparity.stereo_algorithm = 0;
   EXPECT_EQ(toParameters(disparity).correlation_window_size, 5);
 
+  disparity.P1 = 200;
+  disparity.P2 = 800;
+  EXPECT_EQ(toParameters(disparity).P2, 800);
+  disparity.stereo_algorithm = 2;
+  EXPECT_EQ(toParameters(disparity).P2, 224) << "the largest one of CENSUS_SGM";
+  EXPECT_EQ(disparity.P2, 224);
+  EXPECT_EQ(disparity.P1, 200);
+  EXPECT_NO_THROW(validate(toParameters(disparity)));
+
   SegmentationConfig segmentation = SegmentationConfig::__getDefault__();
   segmentation.connectivity = 6;
   EXPECT_EQ(toParameters(segmentation).connectivity, Connectivity::EIGHT);
   EXPECT_EQ(segmentation.connectivity, 8);
+}
+
+TEST(LiveParameters, algorithmsHaveTheNumbersOfTheCore) {
+  DisparityConfig config = DisparityConfig::__getDefault__();
+  config.stereo_algorithm = Disparity_BM;
+  EXPECT_EQ(toParameters(config).stereo_algorithm, StereoAlgorithm::BM);
+  config.stereo_algorithm = Disparity_SGBM;
+  EXPECT_EQ(toParameters(config).stereo_algorithm, StereoAlgorithm::SGBM);
+  config.stereo_algorithm = Disparity_CENSUS_SGM;
+  EXPECT_EQ(toParameters(config).stereo_algorithm, StereoAlgorithm::CENSUS_SGM);
 }
 
 TEST(LiveParameters, fullDpMeansEightDirections) {

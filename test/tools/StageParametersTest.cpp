@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "KittiFixture.hpp"
 #include "StageParameters.hpp"
@@ -63,6 +64,39 @@ TEST(StageParameters, theWindowMayBeSetBeforeTheAlgorithm) {
   EXPECT_NE(refusal([&] { parameters.matching(); }), "") << "too large for SGBM";
   parameters.set("stereo_algorithm", "0");
   EXPECT_EQ(parameters.matching().correlation_window_size, 21);
+}
+
+TEST(StageParameters, thePenaltiesMustFitTheAlgorithm) {
+  StageParameters parameters;
+  parameters.set("P2", "800");
+  EXPECT_EQ(parameters.matching().P2, 800);
+  parameters.set("stereo_algorithm", "2");
+  EXPECT_EQ(refusal([&] { parameters.matching(); }), "P2 is 800, the nearest allowed value is 224");
+  parameters.set("P2", "224");
+  EXPECT_EQ(parameters.matching().stereo_algorithm, StereoAlgorithm::CENSUS_SGM);
+  EXPECT_EQ(refusal([&] { parameters.set("stereo_algorithm", "3"); }),
+            "stereo_algorithm is 3, expected an integer in 0 ... 2");
+}
+
+TEST(StageParameters, readsTheFilesOfParams) {
+  for (const auto& [file, matcher] :
+       {std::pair{"/kitti_bm.yaml", "BM"}, std::pair{"/kitti_sgbm.yaml", "SGBM HH"},
+        std::pair{"/kitti_census_sgm.yaml", "census SGM"}}) {
+    StageParameters parameters;
+    EXPECT_TRUE(parameters.load(std::string(PARAMS_FOLDER) + file).empty()) << file;
+    EXPECT_EQ(matcherName(parameters.matching()), matcher) << file;
+  }
+}
+
+TEST(StageParameters, matchersHaveNames) {
+  MatchingParameters parameters;
+  EXPECT_EQ(matcherName(parameters), "SGBM 3WAY");
+  parameters.sgbm_mode = SgbmMode::HH4;
+  EXPECT_EQ(matcherName(parameters), "SGBM HH4");
+  parameters.stereo_algorithm = StereoAlgorithm::BM;
+  EXPECT_EQ(matcherName(parameters), "BM");
+  parameters.stereo_algorithm = StereoAlgorithm::CENSUS_SGM;
+  EXPECT_EQ(matcherName(parameters), "census SGM");
 }
 
 TEST(StageParameters, readsTheFileOfTheLaunchFiles) {
