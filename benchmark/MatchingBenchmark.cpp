@@ -1,4 +1,4 @@
-// OpenCV's matchers, the yardsticks: all search the same disparities.
+// OpenCV's matchers, the yardsticks, and ours: all search the same disparities.
 
 #include <map>
 #include <memory>
@@ -19,16 +19,51 @@ cv::Ptr<cv::StereoSGBM> semiGlobal(int mode) {
   return cv::StereoSGBM::create(0, DISPARITIES, WINDOW, 8 * AREA, 32 * AREA, 1, 63, 10, 100, 2, mode);
 }
 
-// On a large frame a matcher runs for seconds, and what it allocates is nothing beside that.
 template <class Make>
-void registerMatcher(const std::string& set, const std::string& name, const Make& create) {
+void registerMatcher(const std::string& set, const std::string& name, int threads, WarmUp warm_up,
+                     const Make& create) {
   const auto make = [create](const Frame& frame) {
     return [&frame, matcher = create(), disparity = cv::Mat()]() mutable {
       matcher->compute(frame.left, frame.right, disparity);
     };
   };
-  registerBenchmark(set, name, 1, make, WarmUp::NO);
+  registerBenchmark(set, name, threads, make, warm_up);
 }
+
+// On a large frame OpenCV's matchers run for seconds, and what they allocate is nothing beside that.
+template <class Make>
+void registerMatcher(const std::string& set, const std::string& name, const Make& create) {
+  registerMatcher(set, name, 1, WarmUp::NO, create);
+}
+
+MatchingParameters censusParameters() {
+  MatchingParameters parameters;
+  parameters.stereo_algorithm = StereoAlgorithm::CENSUS_SGM;
+  parameters.disparity_range = DISPARITIES;
+  parameters.full_width = true;
+  return parameters;
+}
+
+// What StereoMatcher does with the census matcher, but on one thread with the vectors that every processor
+// has.
+class MatcherOf16ByteVectors {
+ public:
+  void compute(const cv::Mat& left, const cv::Mat& right, cv::Mat& disparity) {
+    const MatchingParameters common = censusParameters();
+    CensusSgmParameters parameters;
+    parameters.disparity_range = common.disparity_range;
+    parameters.uniqueness_ratio = common.uniqueness_ratio;
+    parameters.disp12_max_diff = common.disp12MaxDiff;
+    matcher_.compute(left, right, parameters, fixed_point_);
+    cv::filterSpeckles(fixed_point_, CensusSgm::INVALID, common.speckle_size,
+                       common.speckle_range * CensusSgm::SUBPIXEL_STEPS, speckle_buffer_);
+    fixed_point_.convertTo(disparity, CV_32F, 1.0 / CensusSgm::SUBPIXEL_STEPS);
+  }
+
+ private:
+  CensusSgm matcher_{CensusSgm::Vectors::BYTES_16};
+  cv::Mat fixed_point_, speckle_buffer_;
+};
 
 #ifdef HAVE_XIMGPROC
 // The disparity of the right image that the filter wants, computed once for every frame.
@@ -62,6 +97,11 @@ void registerMatchingBenchmarks(const std::string& set) {
   parameters.disparity_range = DISPARITIES;
   registerMatcher(set, "StereoMatcher, default (3WAY)",
                   [parameters] { return std::make_unique<StereoMatcher>(parameters); });
+  const auto census = [] { return std::make_unique<StereoMatcher>(censusParameters()); };
+  registerMatcher(set, "census SGM", 1, WarmUp::YES, census);
+  registerMatcher(set, "census SGM, 2 threads", 2, WarmUp::YES, census);
+  registerMatcher(set, "census SGM, 16-byte vectors", 1, WarmUp::YES,
+                  [] { return std::make_unique<MatcherOf16ByteVectors>(); });
 }
 
 }  // namespace disparity_refinement

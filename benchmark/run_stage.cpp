@@ -1,6 +1,10 @@
 // Runs one stage on one frame and nothing else, for what counts instructions, and prints the memory it keeps.
 //
-// - run_stage prepare SET FOLDER writes the first frame of a set (see Frames.hpp) as left.png, disparity.png.
+// - run_stage prepare SET FOLDER writes the first frame of a set (see Frames.hpp) as left.png, right.png,
+//   disparity.png.
+// - run_stage matching FOLDER N matches it N times by CensusSgm, and filters speckles. The vectors are those
+// of
+//   every processor: the count does not depend on it.
 // - run_stage segmentation FOLDER N segments it N times.
 // - run_stage refinement FOLDER N segments it once and refines its disparity N times.
 
@@ -9,10 +13,12 @@
 #include <cstdlib>
 #include <functional>
 #include <iostream>
+#include <opencv2/calib3d.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "Frames.hpp"
 #include "disparity_refinement/evaluation/KittiFiles.hpp"
+#include "disparity_refinement/matching/CensusSgm.hpp"
 #include "disparity_refinement/refinement/PlaneRefinement.hpp"
 #include "disparity_refinement/segmentation/Segmentation.hpp"
 
@@ -22,6 +28,7 @@ namespace {
 void prepare(const std::string& set, const std::string& folder) {
   const Frame& frame = frameSet(set).frames.front();
   cv::imwrite(folder + "/left.png", frame.left);
+  cv::imwrite(folder + "/right.png", frame.right);
   writeDisparityPng(folder + "/disparity.png", frame.disparity, frame.range);
 }
 
@@ -39,6 +46,21 @@ void printScratch(const cv::Mat& input, const std::function<void()>& runs) {
   const double before = allocatedBytes();
   runs();
   std::cout << (allocatedBytes() - before) / static_cast<double>(input.total()) << "\n";
+}
+
+void match(const std::string& folder, int n) {
+  const cv::Mat left = readGrayImage(folder + "/left.png"), right = readGrayImage(folder + "/right.png");
+  CensusSgmParameters parameters;
+  parameters.disparity_range = DISPARITIES;
+  parameters.uniqueness_ratio = 10;
+  cv::Mat disparity(left.size(), CV_16SC1), speckle_buffer;
+  CensusSgm matcher(CensusSgm::Vectors::BYTES_16);
+  printScratch(left, [&] {
+    for (int i = 0; i < n; ++i) {
+      matcher.compute(left, right, parameters, disparity);
+      cv::filterSpeckles(disparity, CensusSgm::INVALID, 100, 2 * CensusSgm::SUBPIXEL_STEPS, speckle_buffer);
+    }
+  });
 }
 
 void segment(const std::string& folder, int n) {
@@ -71,12 +93,14 @@ int main(int argc, char** argv) {
   cv::setNumThreads(1);
   if (command == "prepare") {
     prepare(argv[2], argv[3]);
+  } else if (command == "matching") {
+    match(argv[2], std::atoi(argv[3]));
   } else if (command == "segmentation") {
     segment(argv[2], std::atoi(argv[3]));
   } else if (command == "refinement") {
     refine(argv[2], std::atoi(argv[3]));
   } else {
-    std::cerr << "run_stage: expected prepare SET FOLDER, segmentation FOLDER N or refinement FOLDER N\n";
+    std::cerr << "run_stage: expected prepare SET FOLDER, or matching, segmentation or refinement FOLDER N\n";
     return 1;
   }
 }

@@ -13,6 +13,9 @@ SEGMENTATION = "segmentation (30,5)"
 REFINEMENT = "plane refinement (30,5)"
 SIZES = ["640x480", "1242x375", "1920x1200", "4096x3000"]
 TARGETS = {
+    "census SGM": 0.30,
+    "census SGM, 2 threads": 0.18,
+    "census SGM, 16-byte vectors": 0.50,
     SEGMENTATION: 0.065,
     "segmentation (30,5), 2 threads": 0.045,
     "count surface, 161x61": 0.06,
