@@ -2,9 +2,8 @@
 //
 // - run_stage prepare SET FOLDER writes the first frame of a set (see Frames.hpp) as left.png, right.png,
 //   disparity.png.
-// - run_stage matching FOLDER N matches it N times by CensusSgm, and filters speckles. The vectors are those
-// of
-//   every processor: the count does not depend on it.
+// - run_stage matching FOLDER N matches it N times by CensusSgm and filters speckles, with vectors that
+//   every processor has, so that the count hardly depends on it.
 // - run_stage segmentation FOLDER N segments it N times.
 // - run_stage refinement FOLDER N segments it once and refines its disparity N times.
 

@@ -110,14 +110,16 @@ TEST_F(Tools, evaluatePrintsAndWritesItsFigures) {
 }
 
 TEST_F(Tools, evaluateRunsEveryMatcherOnceInAnyOrderOfTheVariants) {
-  const Outcome outcome = run(
-      "evaluate " + training + " --disparity_range 64 --variant h=1 " +
-      "--variant full_width=true,h=2 --variant h=3 --variant h=4,full_width=true --json " + out("a.json"));
+  const Outcome outcome = run("evaluate " + training + " --disparity_range 64 --variant h=1 " +
+                              "--variant full_width=true,h=2 --variant h=3 --variant h=4,full_width=true "
+                              "--variant stereo_algorithm=2 " +
+                              "--json " + out("a.json"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.text;
   const std::string json = readText(out("a.json"));
   for (const std::string name :
        {"SGBM 3WAY", "SGBM 3WAY + h=1", "SGBM 3WAY, full_width=true", "SGBM 3WAY + full_width=true,h=2",
-        "SGBM 3WAY + h=3", "SGBM 3WAY + h=4,full_width=true"}) {
+        "SGBM 3WAY + h=3", "SGBM 3WAY + h=4,full_width=true", "census SGM, stereo_algorithm=2",
+        "census SGM + stereo_algorithm=2"}) {
     const std::string text = "\"name\": \"" + name + "\"";
     const auto at = json.find(text);
     EXPECT_NE(at, std::string::npos) << name;
