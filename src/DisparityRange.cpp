@@ -1,8 +1,28 @@
 #include "disparity_refinement/DisparityRange.hpp"
 
 #include <algorithm>
+#include <limits>
+
+#include "disparity_refinement/strips.hpp"
 
 namespace disparity_refinement {
+
+void copyValid(const cv::Mat& disparity, const DisparityRange& range, cv::Mat& copy) {
+  copy.create(disparity.size(), CV_32FC1);
+  const float lowest = range.min, largest = std::numeric_limits<float>::max(), invalid = range.invalid();
+  const int threads = std::max(1, cv::getNumThreads());
+  forEachStrip(threads, [&](int i) {
+    const cv::Range rows = stripOf(disparity.rows, i, threads);
+    for (int y = rows.start; y < rows.end; ++y) {
+      const float* from = disparity.ptr<float>(y);
+      float* to = copy.ptr<float>(y);
+      for (int x = 0; x < disparity.cols; ++x) {
+        const float finite = from[x] <= largest ? from[x] : invalid;
+        to[x] = finite >= lowest ? finite : invalid;
+      }
+    }
+  });
+}
 
 void keepOneInvalid(cv::Mat& disparity, const DisparityRange& range) {
   for (int y = 0; y < disparity.rows; ++y) {

@@ -20,6 +20,12 @@ struct DisparityRange {
   bool isValid(float d) const { return d >= min && d <= std::numeric_limits<float>::max(); }
 };
 
+/// Copies a map; whatever is no disparity, NaN and infinity too, becomes range.invalid().
+///
+/// @param disparity  CV_32FC1.
+/// @param copy       Another image; written in place if it has that type and size already.
+void copyValid(const cv::Mat& disparity, const DisparityRange& range, cv::Mat& copy);
+
 /// Marks the top left pixel invalid if every pixel of the map is valid.
 ///
 /// cv::reprojectImageTo3D with handleMissingValues, and with it stereo_image_proc/point_cloud2, takes the

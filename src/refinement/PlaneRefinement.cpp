@@ -8,25 +8,9 @@
 #include <string>
 
 #include "disparity_refinement/arguments.hpp"
-#include "disparity_refinement/buffers.hpp"
-#include "disparity_refinement/refinement/PlaneFit.hpp"
-#include "disparity_refinement/strips.hpp"
 
 namespace disparity_refinement {
 namespace {
-
-// Copies rows of a map. Whatever is no disparity, NaN and infinity too, becomes range.invalid().
-void copyValid(const cv::Mat& disparity, const DisparityRange range, const cv::Range& rows, cv::Mat& copy) {
-  const float lowest = range.min, largest = std::numeric_limits<float>::max(), invalid = range.invalid();
-  for (int y = rows.start; y < rows.end; ++y) {
-    const float* from = disparity.ptr<float>(y);
-    float* to = copy.ptr<float>(y);
-    for (int x = 0; x < disparity.cols; ++x) {
-      const float finite = from[x] <= largest ? from[x] : invalid;
-      to[x] = finite >= lowest ? finite : invalid;
-    }
-  }
-}
 
 // A float is at least this if, and only if, it is at least `bound`.
 float roundedUp(double bound) {
@@ -178,26 +162,13 @@ void PlaneRefinement::refine(const cv::Mat& disparity, const cv::Mat& labels, co
   validate(parameters);
   requireArgument(!overlap(refined, disparity), "refined", "the memory of disparity", "an image of its own");
   requireArgument(!overlap(refined, labels), "refined", "the memory of labels", "an image of its own");
-  segments_.build(labels);
+  fitting_.setLabels(labels);
 
-  refined.create(disparity.size(), CV_32FC1);
-  const int threads = std::max(1, cv::getNumThreads());
-  forEachStrip(threads,
-               [&](int i) { copyValid(disparity, range, stripOf(disparity.rows, i, threads), refined); });
-  growTo(planes_, segments_.size());  // Room for more, but no more planes than segments.
-  planes_.resize(segments_.size());
+  copyValid(disparity, range, refined);
   const Reprojection reprojection(range, focal_length_times_baseline, parameters);
-  // More strips than threads, for the segments differ in size.
-  const int strips = threads > 1 ? 8 * threads : 1;
-  if (points_.size() < static_cast<std::size_t>(strips)) points_.resize(strips);
-  forEachStrip(strips, [&](int i) {
-    const cv::Range part = stripOf(segments_.size(), i, strips);
-    for (int label = part.start; label < part.end; ++label) {
-      const RunSpan runs = segments_[label];
-      SegmentPlane& plane = planes_[label];
-      plane = fitPlane(refined, range, runs, static_cast<std::uint64_t>(label), parameters, points_[i]);
-      if (plane.status == PlaneStatus::ACCEPTED) reprojection.apply(plane, runs, refined);
-    }
+  fitting_.fit(refined, range, parameters, [&](int label, const SegmentPlane& plane, const SegmentPoints&) {
+    if (plane.status != PlaneStatus::ACCEPTED) return;
+    reprojection.apply(plane, fitting_.segments()[label], refined);
   });
   keepOneInvalid(refined, range);
 }

@@ -4,7 +4,7 @@
 #include <opencv2/core.hpp>
 
 #include "disparity_refinement/DisparityRange.hpp"
-#include "disparity_refinement/refinement/PlaneRefinement.hpp"
+#include "disparity_refinement/refinement/PlaneRefinementParameters.hpp"
 #include "disparity_refinement/refinement/SegmentPoints.hpp"
 #include "disparity_refinement/refinement/SegmentRuns.hpp"
 

@@ -1,0 +1,330 @@
+#include "disparity_refinement/refinement/PixelLabeling.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <opencv2/core/hal/intrin.hpp>
+
+#include "disparity_refinement/strips.hpp"
+
+namespace disparity_refinement {
+namespace {
+
+using cv::v_int16x8;
+using cv::v_uint16x8;
+
+// Candidates of a pixel, one vector of them; the last one may be the measured disparity.
+constexpr int CANDIDATES = 8;
+constexpr int MAX_PLANES = CANDIDATES - 1;
+constexpr int STEPS = 16;  // Of a pixel, in disparities and costs.
+// Planes, or plane and measured disparity, that are nearer are the same [px].
+constexpr float SAME = 0.5F;
+// Cost of what is no candidate: more than any path adds up to.
+constexpr std::uint16_t NO_CANDIDATE = 16384;
+// Weights of steps are multiples of 1 / 256.
+constexpr int WEIGHT_SHIFT = 8;
+
+std::uint16_t inSteps(double value) { return static_cast<std::uint16_t>(std::lround(value * STEPS)); }
+
+// A segment's first candidates.
+struct Planes {
+  std::array<DisparityPlane, MAX_PLANES> plane;
+  int size = 0;
+
+  // Unless there is one like it within the rectangle.
+  void add(const DisparityPlane& added, const cv::Rect& box) {
+    if (!added.is_known || size == MAX_PLANES) return;
+    for (int i = 0; i < size; ++i) {
+      double largest = 0.0;
+      for (const int x : {box.x, box.x + box.width - 1}) {
+        for (const int y : {box.y, box.y + box.height - 1}) {
+          largest = std::max(largest, std::abs(added.at(x, y) - plane[i].at(x, y)));
+        }
+      }
+      if (largest < SAME) return;
+    }
+    plane[size++] = added;
+  }
+};
+
+cv::Rect boxOf(RunSpan runs) {
+  int left = std::numeric_limits<int>::max(), right = 0, top = runs.begin()->y, bottom = top;
+  for (const Run& run : runs) {
+    left = std::min(left, run.x_begin);
+    right = std::max(right, run.x_end);
+    bottom = run.y;
+  }
+  return {left, top, right - left, bottom + 1 - top};
+}
+
+// One step of a path. All arrays are of CANDIDATES values.
+class Step {
+ public:
+  explicit Step(const PixelLabelingParameters& p)
+      : truncation_(cv::v_setall_u16(inSteps(p.step_truncation))) {
+    for (int contrast = 0; contrast < 256; ++contrast) {
+      const double weight = p.smoothness * p.half_contrast / (p.half_contrast + contrast);
+      weights_[contrast] = static_cast<std::uint16_t>(std::lround(weight * (1 << WEIGHT_SHIFT)));
+    }
+  }
+
+  void start(const std::uint16_t* costs, std::uint16_t* path, std::uint16_t* sums) const {
+    const v_uint16x8 cost = cv::v_load(costs);
+    cv::v_store(path, cost);
+    cv::v_store(sums, cv::v_load(sums) + cost);
+  }
+
+  // `path`: the values of the pixel before, which has `number_before` candidates, then those of this one.
+  void advance(const short* before, int number_before, const short* disparities, const std::uint16_t* costs,
+               int contrast, std::uint16_t* path, std::uint16_t* sums) const {
+    const v_int16x8 here = cv::v_load(disparities);
+    const v_uint16x8 weight = cv::v_setall_u16(weights_[contrast]);
+    v_uint16x8 best = cv::v_setall_u16(std::numeric_limits<std::uint16_t>::max());
+    for (int j = 0; j < number_before; ++j) {
+      const v_uint16x8 step = cv::v_min(cv::v_absdiff(here, cv::v_setall_s16(before[j])), truncation_);
+      best = cv::v_min(best, cv::v_setall_u16(path[j]) + (cv::v_mul_wrap(step, weight) >> WEIGHT_SHIFT));
+    }
+    if (number_before == 0) best = cv::v_setzero_u16();
+    const v_uint16x8 value = cv::v_load(costs) + best;
+    const v_uint16x8 relative = value - cv::v_setall_u16(cv::v_reduce_min(value));
+    cv::v_store(path, relative);
+    cv::v_store(sums, cv::v_load(sums) + relative);
+  }
+
+ private:
+  v_uint16x8 truncation_;
+  std::array<std::uint16_t, 256> weights_;
+};
+
+// 2^(-x / half) for x = 0, 1, 2...; between the powers of 2 on straight lines, which all machines draw alike.
+std::vector<float> halvings(int half) {
+  std::vector<float> weights;
+  for (float power = 1.0F; power > 1e-6F; power /= 2.0F) {
+    for (int i = 0; i < half; ++i) {
+      weights.push_back(power * (1.0F - 0.5F * static_cast<float>(i) / static_cast<float>(half)));
+    }
+  }
+  return weights;
+}
+
+}  // namespace
+
+void PixelLabeling::mirror(const cv::Mat& measured, const DisparityRange& range, int strips) {
+  right_.create(measured.size(), CV_32FC1);
+  forEachStrip(strips, [&](int i) {
+    const cv::Range rows = stripOf(measured.rows, i, strips);
+    for (int y = rows.start; y < rows.end; ++y) {
+      const float* d = measured.ptr<float>(y);
+      float* right = right_.ptr<float>(y);
+      std::fill(right, right + measured.cols, std::numeric_limits<float>::infinity());
+      for (int x = 0; x < measured.cols; ++x) {
+        if (!range.isValid(d[x])) continue;
+        const float column = std::floor(static_cast<float>(x) - d[x] + 0.5F);
+        if (!(column >= 0.0F && column < static_cast<float>(measured.cols))) continue;
+        float& seen = right[static_cast<int>(column)];
+        // The nearest hides the others.
+        if (seen == std::numeric_limits<float>::infinity() || seen < d[x]) seen = d[x];
+      }
+    }
+  });
+}
+
+void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange& range,
+                                   const SegmentRuns& segments, const SegmentGraph& graph,
+                                   const std::vector<DisparityPlane>& all_planes,
+                                   const PixelLabelingParameters& p, int label, Strip& strip) {
+  const RunSpan runs = segments[label];
+  if (runs.begin() == runs.end()) return;
+  const cv::Rect box = boxOf(runs);
+  Planes planes;
+  planes.add(all_planes[label], box);
+  const SegmentGraph::Borders borders = graph.bordersOf(label);
+  strip.borders.assign(borders.begin(), borders.end());
+  std::sort(strip.borders.begin(), strip.borders.end(), [](const auto& a, const auto& b) {
+    return a.length() != b.length() ? a.length() > b.length() : a.neighbour < b.neighbour;
+  });
+  for (const SegmentGraph::Border& border : strip.borders) planes.add(all_planes[border.neighbour], box);
+
+  // Cost of the planes where something was measured, and where not.
+  std::array<std::uint16_t, CANDIDATES> with_measured, in_hole;
+  std::array<float, CANDIDATES> slope{};
+  with_measured.fill(NO_CANDIDATE);
+  in_hole.fill(NO_CANDIDATE);
+  for (int i = 0; i < planes.size; ++i) {
+    with_measured[i] = i == 0 ? 0 : inSteps(p.neighbour_cost);
+    in_hole[i] = i == 0 ? 0 : inSteps(p.neighbour_cost_in_hole);
+    slope[i] = static_cast<float>(planes.plane[i].a * STEPS);
+  }
+  const std::uint16_t measured_cost = inSteps(p.measured_cost), visibility_cost = inSteps(p.visibility_cost);
+  const v_uint16x8 truncation = cv::v_setall_u16(inSteps(p.data_truncation));
+  const v_uint16x8 data_weight =
+      cv::v_setall_u16(static_cast<std::uint16_t>(std::lround(p.data_weight * (1 << WEIGHT_SHIFT))));
+  const float largest = std::min((range.max - range.min) * STEPS, 32767.0F);
+  const cv::v_float32x4 zero = cv::v_setzero_f32(), end = cv::v_setall_f32(largest);
+  const cv::v_float32x4 slope_low = cv::v_load(slope.data()), slope_high = cv::v_load(slope.data() + 4);
+
+  for (const Run& run : runs) {
+    const float* d = measured.ptr<float>(run.y);
+    const float* right = right_.ptr<float>(run.y);
+    short* disparities = disparities_.ptr<short>(run.y);
+    std::uint16_t* costs = costs_.ptr<std::uint16_t>(run.y);
+    std::uint8_t* numbers = numbers_.ptr<std::uint8_t>(run.y);
+    // At the first pixel of the run; coordinates relative to it are small enough for single precision.
+    std::array<float, CANDIDATES> first{};
+    for (int i = 0; i < planes.size; ++i) {
+      first[i] = static_cast<float>((planes.plane[i].at(run.x_begin, run.y) - range.min) * STEPS);
+    }
+    const cv::v_float32x4 first_low = cv::v_load(first.data()), first_high = cv::v_load(first.data() + 4);
+    for (int x = run.x_begin; x < run.x_end; ++x) {
+      const cv::v_float32x4 offset = cv::v_setall_f32(static_cast<float>(x - run.x_begin));
+      const cv::v_float32x4 low = cv::v_min(cv::v_max(first_low + slope_low * offset, zero), end);
+      const cv::v_float32x4 high = cv::v_min(cv::v_max(first_high + slope_high * offset, zero), end);
+      const v_int16x8 planes_here = cv::v_pack(cv::v_round(low), cv::v_round(high));
+      short* candidate = disparities + x * CANDIDATES;
+      std::uint16_t* cost = costs + x * CANDIDATES;
+      cv::v_store(candidate, planes_here);
+      int n = planes.size;
+      if (range.isValid(d[x])) {
+        const float value = std::min((d[x] - range.min) * STEPS, 32767.0F);
+        const short own = static_cast<short>(std::floor(value + 0.5F));
+        const v_uint16x8 distance = cv::v_min(cv::v_absdiff(planes_here, cv::v_setall_s16(own)), truncation);
+        cv::v_store(
+            cost, cv::v_load(with_measured.data()) + (cv::v_mul_wrap(distance, data_weight) >> WEIGHT_SHIFT));
+        if (n == 0 || std::abs(candidate[0] - own) > SAME * STEPS) {
+          candidate[n] = own;
+          cost[n] = measured_cost;
+          ++n;
+        }
+      } else {
+        cv::v_store(cost, cv::v_load(in_hole.data()));
+      }
+      numbers[x] = static_cast<std::uint8_t>(n);
+      if (n < 2) continue;
+      for (int i = 0; i < n; ++i) {
+        const float at = range.min + static_cast<float>(candidate[i]) / STEPS;
+        const float column = std::floor(static_cast<float>(x) - at + 0.5F);
+        if (!(column >= 0.0F && column < static_cast<float>(measured.cols))) continue;
+        if (right[static_cast<int>(column)] < at - 1.0F)
+          cost[i] = static_cast<std::uint16_t>(cost[i] + visibility_cost);
+      }
+    }
+  }
+}
+
+void PixelLabeling::addPaths(const cv::Mat& gray, const PixelLabelingParameters& p, int strips) {
+  const Step step(p);
+  const int rows = gray.rows, cols = gray.cols;
+  forEachStrip(strips, [&](int i) {
+    const cv::Range part = stripOf(rows, i, strips);
+    std::array<std::uint16_t, CANDIDATES> path;
+    for (int y = part.start; y < part.end; ++y) {
+      const short* disparities = disparities_.ptr<short>(y);
+      const auto* costs = costs_.ptr<std::uint16_t>(y);
+      auto* sums = sums_.ptr<std::uint16_t>(y);
+      const auto *numbers = numbers_.ptr<std::uint8_t>(y), *value = gray.ptr<std::uint8_t>(y);
+      std::fill(sums, sums + cols * CANDIDATES, std::uint16_t{0});
+      const auto walk = [&](int first, int end, int direction) {
+        step.start(costs + first * CANDIDATES, path.data(), sums + first * CANDIDATES);
+        for (int x = first + direction; x != end; x += direction) {
+          const int before = x - direction;
+          step.advance(disparities + before * CANDIDATES, numbers[before], disparities + x * CANDIDATES,
+                       costs + x * CANDIDATES, std::abs(value[x] - value[before]), path.data(),
+                       sums + x * CANDIDATES);
+        }
+      };
+      walk(0, cols, 1);
+      walk(cols - 1, -1, -1);
+    }
+  });
+  forEachStrip(strips, [&](int i) {
+    const cv::Range part = stripOf(cols, i, strips);
+    std::vector<std::uint16_t>& paths = strips_[i].path;
+    paths.resize(static_cast<std::size_t>(part.size()) * CANDIDATES);
+    const auto walk = [&](int first, int end, int direction) {
+      for (int y = first; y != end; y += direction) {
+        const short* disparities = disparities_.ptr<short>(y);
+        const auto* costs = costs_.ptr<std::uint16_t>(y);
+        auto* sums = sums_.ptr<std::uint16_t>(y);
+        const auto* value = gray.ptr<std::uint8_t>(y);
+        const int before = y == first ? y : y - direction;
+        const short* disparities_before = disparities_.ptr<short>(before);
+        const auto *numbers_before = numbers_.ptr<std::uint8_t>(before),
+                   *value_before = gray.ptr<std::uint8_t>(before);
+        for (int x = part.start; x < part.end; ++x) {
+          std::uint16_t* path = paths.data() + (x - part.start) * CANDIDATES;
+          if (y == first) {
+            step.start(costs + x * CANDIDATES, path, sums + x * CANDIDATES);
+          } else {
+            step.advance(disparities_before + x * CANDIDATES, numbers_before[x], disparities + x * CANDIDATES,
+                         costs + x * CANDIDATES, std::abs(value[x] - value_before[x]), path,
+                         sums + x * CANDIDATES);
+          }
+        }
+      }
+    };
+    walk(0, rows, 1);
+    walk(rows - 1, -1, -1);
+  });
+}
+
+void PixelLabeling::choose(const cv::Mat& measured, const DisparityRange& range,
+                           const PixelLabelingParameters& p, int strips, cv::Mat& result) const {
+  // The sums are of four paths.
+  const std::vector<float> weights = halvings(std::max(1, 4 * inSteps(p.half_cost)));
+  const int reach = inSteps(p.soft_reach);
+  forEachStrip(strips, [&](int strip) {
+    const cv::Range rows = stripOf(measured.rows, strip, strips);
+    for (int y = rows.start; y < rows.end; ++y) {
+      const float* d = measured.ptr<float>(y);
+      float* out = result.ptr<float>(y);
+      const auto* numbers = numbers_.ptr<std::uint8_t>(y);
+      for (int x = 0; x < measured.cols; ++x) {
+        const short* candidate = disparities_.ptr<short>(y) + x * CANDIDATES;
+        const std::uint16_t* sum = sums_.ptr<std::uint16_t>(y) + x * CANDIDATES;
+        const int n = numbers[x];
+        if (n == 0) {
+          out[x] = d[x];
+          continue;
+        }
+        int best = 0;
+        for (int i = 1; i < n; ++i) best = sum[i] < sum[best] ? i : best;
+        float total = 0.0F, weighted = 0.0F;
+        for (int i = 0; i < n; ++i) {
+          const std::size_t dearer = sum[i] - sum[best];
+          if (std::abs(candidate[i] - candidate[best]) > reach || dearer >= weights.size()) continue;
+          total += weights[dearer];
+          weighted += weights[dearer] * static_cast<float>(candidate[i]);
+        }
+        out[x] = range.min + weighted / total / STEPS;
+      }
+    }
+  });
+}
+
+void PixelLabeling::compute(const cv::Mat& measured, const cv::Mat& gray, const DisparityRange& range,
+                            const SegmentRuns& segments, const SegmentGraph& graph,
+                            const std::vector<DisparityPlane>& planes,
+                            const PixelLabelingParameters& parameters, cv::Mat& result) {
+  const int strips = std::max(1, cv::getNumThreads());
+  strips_.resize(std::max<std::size_t>(strips_.size(), strips));
+  const cv::Size all(measured.cols * CANDIDATES, measured.rows);
+  disparities_.create(all, CV_16SC1);
+  costs_.create(all, CV_16UC1);
+  sums_.create(all, CV_16UC1);
+  numbers_.create(measured.size(), CV_8UC1);
+  numbers_ = 0;
+  mirror(measured, range, strips);
+  forEachStrip(strips, [&](int i) {
+    const cv::Range part = stripOf(segments.size(), i, strips);
+    for (int label = part.start; label < part.end; ++label) {
+      findCandidates(measured, range, segments, graph, planes, parameters, label, strips_[i]);
+    }
+  });
+  addPaths(gray, parameters, strips);
+  choose(measured, range, parameters, strips, result);
+}
+
+}  // namespace disparity_refinement
