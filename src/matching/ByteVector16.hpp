@@ -36,6 +36,18 @@ inline ByteVector16 difference(const ByteVector16& a, const ByteVector16& b) {
   return ByteVector16(cv::v_absdiff(a.v, b.v));
 }
 
+/// (a + b + 1) / 2. OpenCV has none.
+inline ByteVector16 average(const ByteVector16& a, const ByteVector16& b) {
+#if CV_SIMD128_CPP || !(CV_SSE2 || CV_NEON)
+  const cv::v_uint8x16 half = cv::v_reinterpret_as_u8(cv::v_reinterpret_as_u16(a.v ^ b.v) >> 1);
+  return ByteVector16((a.v | b.v) - (half & cv::v_setall_u8(127)));
+#elif CV_SSE2
+  return ByteVector16(cv::v_uint8x16(_mm_avg_epu8(a.v.val, b.v.val)));
+#else
+  return ByteVector16(cv::v_uint8x16(vrhaddq_u8(a.v.val, b.v.val)));
+#endif
+}
+
 /// 255 where they are equal, otherwise 0.
 inline ByteVector16 equal(const ByteVector16& a, const ByteVector16& b) { return ByteVector16(a.v == b.v); }
 

@@ -34,6 +34,9 @@ inline ByteVector32 subtract(ByteVector32 a, ByteVector32 b) {
 inline ByteVector32 difference(ByteVector32 a, ByteVector32 b) {
   return ByteVector32(_mm256_sub_epi8(_mm256_max_epu8(a.v, b.v), _mm256_min_epu8(a.v, b.v)));
 }
+inline ByteVector32 average(ByteVector32 a, ByteVector32 b) {
+  return ByteVector32(_mm256_avg_epu8(a.v, b.v));
+}
 inline ByteVector32 equal(ByteVector32 a, ByteVector32 b) {
   return ByteVector32(_mm256_cmpeq_epi8(a.v, b.v));
 }

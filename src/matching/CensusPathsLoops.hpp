@@ -16,13 +16,13 @@ template <class Vector, int FIXED>
 class CensusPathsLoops {
  public:
   static void step(const CensusPathsInput& input, int y, int x_begin, int x_end, std::uint8_t* state) {
-    const Costs costs(input, y);
+    Costs costs(input, y, x_begin);
     const Step next(input);
     const int vectors = vectorsOf(input);
     for (int x = x_begin; x < x_end; ++x) {
       std::uint8_t* pixel = state + x * bytesOf(input);
       Values c, path;
-      costs.compute(x, c);
+      costs.next(c);
       path.load(pixel, vectors);
       next.advance(path, c, [](int, Vector) {});
       path.store(pixel, vectors);
@@ -31,13 +31,13 @@ class CensusPathsLoops {
 
   static void stepAndKeep(const CensusPathsInput& input, int y, std::uint8_t* state, std::uint8_t* kept_costs,
                           std::uint8_t* kept_values) {
-    const Costs costs(input, y);
+    Costs costs(input, y, 0);
     const Step next(input);
     const int vectors = vectorsOf(input);
     for (int x = 0; x < input.width; ++x) {
       const std::ptrdiff_t offset = x * bytesOf(input);
       Values c, path;
-      costs.compute(x, c);
+      costs.next(c);
       c.store(kept_costs + offset, vectors);
       path.load(state + offset, vectors);
       next.advance(path, c, [&](int r, Vector value) { value.store(kept_values + offset + r * N); });
@@ -89,26 +89,45 @@ class CensusPathsLoops {
     }
   };
 
-  // The costs of all disparities of a pixel of row y.
+  // The costs of all disparities of the pixels of row y, from x on, one pixel after the other.
   class Costs {
    public:
-    Costs(const CensusPathsInput& input, int y)
+    Costs(const CensusPathsInput& input, int y, int x)
         : vectors_(vectorsOf(input)),
-          last_position_(input.width - 1),
+          last_(input.width - 1),
           first_inside_(input.min_disparity + input.disparities - 1),
           end_inside_(input.width + input.min_disparity),
           has_beyond_(input.disparities < bytesOf(input)),
           phase_step_(input.phase_step),
           inside_(input.inside),
-          beyond_(input.beyond) {
+          beyond_(input.beyond),
+          x_(x) {
       for (int k = 0; k < 3; ++k) {
         left_[k] = input.left[k] + y * input.left_step;
         right_[k] = input.right[k] + y * input.right_step;
       }
+      compare(x, here_);
+      compare(x > 0 ? x - 1 : x, before_);
     }
 
-    void compute(int x, Values& c) const {
-      const unsigned position = static_cast<unsigned>(last_position_ - x);
+    void next(Values& c) {
+      Values after;
+      compare(x_ < last_ ? x_ + 1 : x_, after);
+      for (int r = 0; r < vectors_; ++r) {
+        c.of[r] = average(average(before_.of[r], after.of[r]), here_.of[r]);
+        before_.of[r] = here_.of[r];
+        here_.of[r] = after.of[r];
+      }
+      if (has_beyond_) {
+        for (int r = 0; r < vectors_; ++r) c.of[r] = either(c.of[r], Vector::load(beyond_ + r * N));
+      }
+      ++x_;
+    }
+
+   private:
+    // The costs of a single pixel.
+    void compare(int x, Values& c) const {
+      const unsigned position = static_cast<unsigned>(last_ - x);
       const unsigned vectors = static_cast<unsigned>(vectors_);
       const std::ptrdiff_t first = (position % vectors) * phase_step_ + position / vectors;
       const Vector l0 = Vector::all(left_[0][x]), l1 = Vector::all(left_[1][x]),
@@ -125,16 +144,14 @@ class CensusPathsLoops {
                            Vector::all(OUTSIDE_CENSUS_COST));
         }
       }
-      if (has_beyond_) {
-        for (int r = 0; r < vectors_; ++r) c.of[r] = either(c.of[r], Vector::load(beyond_ + r * N));
-      }
     }
 
-   private:
-    const int vectors_, last_position_, first_inside_, end_inside_;
+    const int vectors_, last_, first_inside_, end_inside_;
     const bool has_beyond_;
     const std::ptrdiff_t phase_step_;
     const std::uint8_t *left_[3], *right_[3], *inside_, *beyond_;
+    int x_;
+    Values before_, here_;  // Those of the pixels x_ - 1 and x_.
   };
 
   // One step of a path.

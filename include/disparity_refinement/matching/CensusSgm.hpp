@@ -23,8 +23,14 @@ struct CensusSgmParameters {
 /// Throws std::invalid_argument that names the parameter, its value and what is expected.
 void validate(const CensusSgmParameters& parameters);
 
-/// Semi-global matching (Hirschmueller, PAMI 2008) along four paths on costs of one byte: the differing bits
-/// of a centre-symmetric census transform and the difference of the slopes (CensusPlanes).
+/// Semi-global matching (Hirschmueller, PAMI 2008) along four paths on costs of one byte.
+///
+/// The cost c(x, d) of a single pixel is the number of differing bits of a centre-symmetric census transform
+/// and the difference of the slopes (CensusPlanes); 10 where d leads outside of the right image. The paths
+/// take the averages along the row C(x, d) = avg(avg(c(x - 1, d), c(x + 1, d)), c(x, d)), rounded upwards
+/// twice: avg(a, b) = (a + b + 1) / 2. At the borders the pixel itself stands for the neighbour that is
+/// missing. Averages have less of the noise of single pixels, and on slanted walls more disparities pass the
+/// left-right check.
 ///
 /// A path value is L(p, d) = C(p, d) + min(L'(d), L'(d - 1) + P1, L'(d + 1) + P1, P2), L' the values of the
 /// pixel before less their least one. The disparity of a pixel has the least sum of the four; sums are cut at
@@ -48,9 +54,8 @@ class CensusSgm {
 
   /// @param left, right  CV_8UC1, of the same size, not empty.
   /// @param disparity    CV_16SC1 [1/16 px], less min_disparity; INVALID where ambiguous, where the
-  /// left-right
-  ///                     check fails and where the best match lies outside of the right image. Every other
-  ///                     pixel has the median of 3 x 3 disparities.
+  ///                     left-right check fails and where the best match lies outside of the right image.
+  ///                     Every other pixel has the median of 3 x 3 disparities.
   /// @param threads      Parts that are computed side by side, >= 1.
   /// @throws std::invalid_argument  for images of another type or size, empty ones and bad parameters.
   void compute(const cv::Mat& left, const cv::Mat& right, const CensusSgmParameters& parameters,

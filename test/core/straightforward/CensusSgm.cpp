@@ -44,7 +44,7 @@ class Volume {
   std::vector<int> numbers_;
 };
 
-Volume costsOf(const cv::Mat& left, const cv::Mat& right, const CensusSgmParameters& p) {
+Volume costsOfPairs(const cv::Mat& left, const cv::Mat& right, const CensusSgmParameters& p) {
   const cv::Mat left_bits = censusBits(left), right_bits = censusBits(right);
   const cv::Mat left_slope = censusSlope(left), right_slope = censusSlope(right);
   Volume costs(left.size(), p.disparity_range);
@@ -60,6 +60,23 @@ Volume costsOf(const cv::Mat& left, const cv::Mat& right, const CensusSgmParamet
                               b = right_bits.at<std::uint16_t>(y, right_x);
         const int slopes = left_slope.at<std::uint8_t>(y, x) - right_slope.at<std::uint8_t>(y, right_x);
         costs.at(x, y, d) = static_cast<int>((a ^ b).count()) + std::abs(slopes);
+      }
+    }
+  }
+  return costs;
+}
+
+int halfOf(int sum) { return (sum + 1) / 2; }
+
+Volume costsOf(const cv::Mat& left, const cv::Mat& right, const CensusSgmParameters& p) {
+  const Volume pairs = costsOfPairs(left, right, p);
+  Volume costs(left.size(), p.disparity_range);
+  for (int y = 0; y < left.rows; ++y) {
+    for (int x = 0; x < left.cols; ++x) {
+      const int before = std::max(x - 1, 0), after = std::min(x + 1, left.cols - 1);
+      for (int d = 0; d < p.disparity_range; ++d) {
+        const int beside = halfOf(pairs.at(before, y, d) + pairs.at(after, y, d));
+        costs.at(x, y, d) = halfOf(beside + pairs.at(x, y, d));
       }
     }
   }
