@@ -190,7 +190,7 @@ TEST(CensusSgm, equalsTheReferenceForRandomParameters) {
     CensusSgmParameters p;
     p.disparity_range = pairs.oneOf<int>({pairs.number(1, 70), 16, 48, 64, 80, 128});
     p.min_disparity = pairs.oneOf<int>({0, 0, pairs.number(-40, 40)});
-    p.p2 = pairs.oneOf<int>({0, 1, 75, 224, pairs.number(0, 225)});
+    p.p2 = pairs.oneOf<int>({0, 1, 50, 224, pairs.number(0, 225)});
     p.p1 = pairs.oneOf<int>({0, std::min(6, p.p2), p.p2, pairs.number(0, p.p2 + 1)});
     p.uniqueness_ratio = pairs.oneOf<int>({0, 1, 10, 50, 99});
     p.disp12_max_diff = pairs.oneOf<int>({-1, 0, 1, 5});
@@ -334,7 +334,7 @@ TEST(CensusSgmParameters, limits) {
   const std::vector<Limits> limits = {
       {"min_disparity", &CensusSgmParameters::min_disparity, {-2048, 2048}, {-2049, 2049}, "-2048...2048"},
       {"disparity_range", &CensusSgmParameters::disparity_range, {1, 2048}, {-1, 0, 2049}, "1...2048"},
-      {"P1", &CensusSgmParameters::p1, {0, 75}, {-1, 76}, "0...P2"},
+      {"P1", &CensusSgmParameters::p1, {0, 50}, {-1, 51}, "0...P2"},
       {"P2", &CensusSgmParameters::p2, {6, 224}, {-1, 225}, "0...224"},
       {"uniqueness_ratio", &CensusSgmParameters::uniqueness_ratio, {0, 99}, {-1, 100}, "0...99"},
       {"disp12_max_diff", &CensusSgmParameters::disp12_max_diff, {-100, -1, 0, 100000}, {}, ""}};

@@ -346,7 +346,10 @@ TEST(StereoMatcher, speckleRangeIsInPixelsForAllAlgorithms) {
     MatchingParameters p = parametersOf(method);
     p.correlation_window_size = 5;
     // Otherwise CENSUS_SGM would take the step in several smaller ones.
-    if (method.algorithm == StereoAlgorithm::CENSUS_SGM) p.P1 = 60;
+    if (method.algorithm == StereoAlgorithm::CENSUS_SGM) {
+      p.P1 = 60;
+      p.P2 = 75;
+    }
     p.speckle_size = 600;
     const auto patchPixels = [&p, &pair, &patch](int speckle_range) {
       p.speckle_range = speckle_range;
@@ -651,7 +654,7 @@ TEST(MatchingParameters, limitsOfSgbm) {
 
 TEST(MatchingParameters, limitsOfCensusSgm) {
   expectLimits(parametersOf(METHODS.back()),
-               {{"P1", &MatchingParameters::P1, {0, 1, 74}, {-1}},
+               {{"P1", &MatchingParameters::P1, {0, 1, 49}, {-1}},
                 {"P2", &MatchingParameters::P2, {0, 7, 224}, {-1, 6, 225, 16383}},
                 {"disp12MaxDiff", &MatchingParameters::disp12MaxDiff, {-1, 0, 4096}, {-2, 4097}},
                 // Those of OpenCV's matchers.
@@ -684,15 +687,15 @@ TEST(MatchingParameters, penaltiesOfZeroComeFromTheWindow) {
 
 TEST(MatchingParameters, penaltiesOfZeroAreThoseOfTheCensusMatcher) {
   MatchingParameters p = parametersOf(METHODS.back());
-  p.P1 = 75;
-  EXPECT_EQ(errorOf([&p] { validate(p); }), "P2 is 75, expected more than P1, which is 75");
+  p.P1 = 50;
+  EXPECT_EQ(errorOf([&p] { validate(p); }), "P2 is 50, expected more than P1, which is 50");
   p.P1 = 0;
   p.P2 = 6;
   EXPECT_EQ(errorOf([&p] { validate(p); }), "P2 is 6, expected more than P1, which is 6");
 
   const StereoPair pair = texturedPair({160, 40}, [](int y) { return 5.0 + 0.7 * y; });
   p.P1 = 6;
-  p.P2 = 75;
+  p.P2 = 50;
   cv::Mat expected, map;
   StereoMatcher(p).compute(pair.left, pair.right, expected);
   p.P1 = p.P2 = 0;

@@ -15,7 +15,7 @@ struct CensusSgmParameters {
   int min_disparity = 0;      ///< Smallest disparity searched [px].
   int disparity_range = 128;  ///< Number of disparities searched [px], 1...2048.
   int p1 = 6;                 ///< Penalty of a disparity step of 1 px, 0...p2.
-  int p2 = 75;                ///< Penalty of a larger step, at most 224: path values fit into a byte.
+  int p2 = 50;                ///< Penalty of a larger step, at most 224: path values fit into a byte.
   int uniqueness_ratio = 0;   ///< Margin by which the least sum must beat others [%], 0...99.
   int disp12_max_diff = 1;    ///< Largest difference to the disparity of the right view [px]; < 0: no check.
 };

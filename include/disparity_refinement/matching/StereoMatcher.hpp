@@ -46,7 +46,7 @@ struct MatchingParameters {
   /// CENSUS_SGM 6.
   int P1 = 0;
   /// SGBM and CENSUS_SGM: penalty for a larger step, greater than P1; 0: 32 * correlation_window_size^2, with
-  /// CENSUS_SGM 75. At most 16383, as two of them must fit into 16 bits, with CENSUS_SGM 224: see there.
+  /// CENSUS_SGM 50. At most 16383, as two of them must fit into 16 bits, with CENSUS_SGM 224: see there.
   int P2 = 0;
   /// SGBM and CENSUS_SGM: largest difference in the left-right check [px], at most 4096; -1: no check; with
   /// SGBM 0 counts as 1.
