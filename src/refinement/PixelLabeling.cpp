@@ -78,8 +78,12 @@ class Step {
   }
 
   // `path`: the values of the pixel before, which has `number_before` candidates, then those of this one.
-  void advance(const short* before, int number_before, const short* disparities, const std::uint16_t* costs,
-               int contrast, std::uint16_t* path, std::uint16_t* sums) const {
+  void advance(const short* before, int number_before, const short* disparities, int number,
+               const std::uint16_t* costs, int contrast, std::uint16_t* path, std::uint16_t* sums) const {
+    if (number < 2) {  // Nothing to choose: less the least one, its value is 0.
+      path[0] = 0;
+      return;
+    }
     const v_int16x8 here = cv::v_load(disparities);
     const v_uint16x8 weight = cv::v_setall_u16(weights_[contrast]);
     v_uint16x8 best = cv::v_setall_u16(std::numeric_limits<std::uint16_t>::max());
@@ -231,7 +235,7 @@ void PixelLabeling::addPaths(const cv::Mat& gray, const PixelLabelingParameters&
         for (int x = first + direction; x != end; x += direction) {
           const int before = x - direction;
           step.advance(disparities + before * CANDIDATES, numbers[before], disparities + x * CANDIDATES,
-                       costs + x * CANDIDATES, std::abs(value[x] - value[before]), path.data(),
+                       numbers[x], costs + x * CANDIDATES, std::abs(value[x] - value[before]), path.data(),
                        sums + x * CANDIDATES);
         }
       };
@@ -248,7 +252,7 @@ void PixelLabeling::addPaths(const cv::Mat& gray, const PixelLabelingParameters&
         const short* disparities = disparities_.ptr<short>(y);
         const auto* costs = costs_.ptr<std::uint16_t>(y);
         auto* sums = sums_.ptr<std::uint16_t>(y);
-        const auto* value = gray.ptr<std::uint8_t>(y);
+        const auto *value = gray.ptr<std::uint8_t>(y), *numbers = numbers_.ptr<std::uint8_t>(y);
         const int before = y == first ? y : y - direction;
         const short* disparities_before = disparities_.ptr<short>(before);
         const auto *numbers_before = numbers_.ptr<std::uint8_t>(before),
@@ -259,7 +263,7 @@ void PixelLabeling::addPaths(const cv::Mat& gray, const PixelLabelingParameters&
             step.start(costs + x * CANDIDATES, path, sums + x * CANDIDATES);
           } else {
             step.advance(disparities_before + x * CANDIDATES, numbers_before[x], disparities + x * CANDIDATES,
-                         costs + x * CANDIDATES, std::abs(value[x] - value_before[x]), path,
+                         numbers[x], costs + x * CANDIDATES, std::abs(value[x] - value_before[x]), path,
                          sums + x * CANDIDATES);
           }
         }

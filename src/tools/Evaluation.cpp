@@ -135,8 +135,14 @@ class FrameEvaluator {
     const PlaneRefinementParameters refinement_parameters = parameters.refinement();
     cv::Mat refined;
     figures.ms.refinement = timed([&] {
-      refinement_.refine(disparity_, labels_, range, geometry.focal_length * geometry.baseline,
-                         refinement_parameters, refined);
+      if (method.quality) {
+        QualityParameters quality_parameters = *method.quality;
+        quality_parameters.fit = refinement_parameters;
+        quality_refinement_.refine(disparity_, labels_, frame.left, range, quality_parameters, refined);
+      } else {
+        refinement_.refine(disparity_, labels_, range, geometry.focal_length * geometry.baseline,
+                           refinement_parameters, refined);
+      }
     });
     map_ = roundToKittiPng(refined, range);
     if (options_.pictures.empty()) return;
@@ -165,6 +171,7 @@ class FrameEvaluator {
   StereoMatcher matcher_;
   Segmentation segmentation_;
   PlaneRefinement refinement_;
+  QualityRefinement quality_refinement_;
   /// Parameters of what disparity_ and labels_ hold for this frame; null: nothing yet.
   const StageParameters *matched_ = nullptr, *segmented_ = nullptr;
   cv::Mat disparity_, labels_, map_;

@@ -9,6 +9,7 @@
 #include "StageParameters.hpp"
 #include "disparity_refinement/evaluation/KittiDataset.hpp"
 #include "disparity_refinement/evaluation/KittiMetric.hpp"
+#include "disparity_refinement/refinement/QualityRefinement.hpp"
 
 namespace disparity_refinement {
 
@@ -18,6 +19,8 @@ struct EvaluatedMethod {
   std::string maps;            ///< Folder with FRAME.png, KITTI's 16-bit PNG; empty: the maps are computed.
   StageParameters parameters;  ///< Of a computed method.
   bool is_refined = true;  ///< Of a computed method: with segmentation and refinement, or the matcher alone.
+  /// Of a refined method: the refinement beyond the paper, with the fit of `parameters`. None: the paper's.
+  std::optional<QualityParameters> quality;
 
   bool isComputed() const { return maps.empty(); }
   bool isRefined() const { return isComputed() && is_refined; }

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "disparity_refinement/arguments.hpp"
 #include "disparity_refinement/ros/LiveParameters.hpp"
 
 namespace disparity_refinement {
@@ -223,6 +224,11 @@ void StageParameters::readOptions(const po::variables_map& options) {
   for (const auto& [name, value] : values()) {
     if (options.count(name) > 0) set(name, options[name].as<std::string>());
   }
+}
+
+std::optional<QualityParameters> qualityOf(const std::string& mode) {
+  requireArgument(mode == "paper" || mode == "quality", "mode", mode, "paper or quality");
+  return mode == "quality" ? std::optional<QualityParameters>(QualityParameters()) : std::nullopt;
 }
 
 std::string matcherName(const MatchingParameters& parameters) {

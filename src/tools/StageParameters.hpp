@@ -2,6 +2,7 @@
 
 #include <boost/program_options.hpp>
 #include <map>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "disparity_refinement/SegmentationConfig.h"
 #include "disparity_refinement/matching/StereoMatcher.hpp"
 #include "disparity_refinement/refinement/PlaneRefinement.hpp"
+#include "disparity_refinement/refinement/QualityRefinement.hpp"
 #include "disparity_refinement/segmentation/Segmentation.hpp"
 
 namespace disparity_refinement {
@@ -56,6 +58,10 @@ class StageParameters {
   SegmentationConfig segmentation_ = SegmentationConfig::__getDefault__();
   PlaneRefinementConfig plane_refinement_ = PlaneRefinementConfig::__getDefault__();
 };
+
+/// What --mode stands for: nothing for "paper", the refinement beyond it for "quality". Throws
+/// std::invalid_argument for other texts.
+std::optional<QualityParameters> qualityOf(const std::string& mode);
 
 /// "BM", "SGBM", "SGBM HH" or the like for SGBM's modes, "census SGM".
 std::string matcherName(const MatchingParameters& parameters);

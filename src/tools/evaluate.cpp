@@ -2,6 +2,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
+#include <iterator>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <thread>
@@ -114,6 +116,39 @@ std::vector<KittiFrame> openFrames(const std::string& folder, bool with_images,
   return frames;
 }
 
+/// A step of the refinement beyond the paper, in the order in which they are made.
+struct QualityStep {
+  const char* name;
+  void (*leaveOut)(QualityParameters&);
+};
+
+constexpr QualityStep QUALITY_STEPS[] = {
+    {"plane selection", [](QualityParameters& p) { p.selection.sweeps = 0; }},
+    {"plane smoothing", [](QualityParameters& p) { p.smoothing.sweeps = 0; }},
+    {"pixel labeling", [](QualityParameters& p) { p.label_pixels = false; }},
+    {"soft output", [](QualityParameters& p) { p.labeling.soft_reach = 0.0; }},
+    {"medians", [](QualityParameters& p) { p.medians = 0; }},
+};
+
+/// The method with the first steps only, one row for every number of them, and then without one step alone.
+std::vector<EvaluatedMethod> ablation(const EvaluatedMethod& complete) {
+  std::vector<EvaluatedMethod> methods;
+  const int steps = static_cast<int>(std::size(QUALITY_STEPS));
+  for (int made = 0; made <= steps; ++made) {
+    EvaluatedMethod method = complete;
+    for (int i = made; i < steps; ++i) QUALITY_STEPS[i].leaveOut(*method.quality);
+    method.name = made == 0 ? complete.name + ": planes" : "+ " + std::string(QUALITY_STEPS[made - 1].name);
+    methods.push_back(method);
+  }
+  for (const QualityStep& step : QUALITY_STEPS) {
+    EvaluatedMethod method = complete;
+    step.leaveOut(*method.quality);
+    method.name = "all without " + std::string(step.name);
+    methods.push_back(method);
+  }
+  return methods;
+}
+
 std::string refinedName(const StageParameters& parameters, const std::string& variant) {
   const SegmentationParameters segmentation = parameters.segmentation();
   const std::string settings =
@@ -123,7 +158,9 @@ std::string refinedName(const StageParameters& parameters, const std::string& va
 
 /// The refinement with every variant of the parameters; before it, once for every matcher among them, the
 /// matcher alone.
-std::vector<EvaluatedMethod> makeMethods(const StageParameters& base, std::vector<std::string> variants) {
+std::vector<EvaluatedMethod> makeMethods(const StageParameters& base, std::vector<std::string> variants,
+                                         const std::optional<QualityParameters>& quality,
+                                         bool with_ablation) {
   if (variants.empty()) variants.emplace_back();
   std::vector<EvaluatedMethod> methods;
   for (const std::string& variant : variants) {
@@ -149,7 +186,14 @@ std::vector<EvaluatedMethod> makeMethods(const StageParameters& base, std::vecto
       methods.push_back(matcher);
     }
     method.name = refinedName(method.parameters, variant);
-    methods.push_back(method);
+    if (quality) method.name += " quality";
+    method.quality = quality;
+    if (with_ablation) {
+      const std::vector<EvaluatedMethod> steps = ablation(method);
+      methods.insert(methods.end(), steps.begin(), steps.end());
+    } else {
+      methods.push_back(method);
+    }
   }
   return methods;
 }
@@ -162,6 +206,8 @@ void refuseWithMaps(const po::variables_map& values) {
   for (const char* name : {"variant", "params", "write-maps", "pictures"}) {
     if (values.count(name) > 0) refuse(name);
   }
+  if (!values["mode"].defaulted()) refuse("mode");
+  if (!values["ablation"].defaulted()) refuse("ablation");
   for (const auto& parameter : StageParameters().values()) {
     if (values.count(parameter.first) > 0) refuse(parameter.first);
   }
@@ -171,12 +217,16 @@ void run(int argc, char** argv) {
   EvaluationOptions options;
   options.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   std::vector<std::string> variants;
-  std::string frames, maps, name, json, csv;
+  std::string frames, maps, name, json, csv, mode = "paper";
+  bool with_ablation = false;
   po::options_description description("Options");
   description.add_options()("frames", po::value(&frames)->value_name("LIST"),
                             "numbers of the frames, such as 0,4,100-120; default all")(
       "threads", po::value(&options.threads)->default_value(options.threads),
       "frames computed at the same time; the figures do not depend on it, the times are truest with 1")(
+      "mode", po::value(&mode)->default_value(mode)->value_name("MODE"),
+      "paper, or quality: the refinement beyond the paper")(
+      "ablation", po::bool_switch(&with_ablation), "with --mode quality: its steps one after the other")(
       "variant", po::value(&variants)->value_name("NAME=VALUE[,NAME=VALUE...]"),
       "refine with these parameters instead; any number of times, all in one run")(
       "maps", po::value(&maps)->value_name("DIR"), "score the maps DIR/FRAME.png (KITTI's 16-bit PNG)")(
@@ -198,7 +248,10 @@ void run(int argc, char** argv) {
   base.readOptions(values);
   std::vector<EvaluatedMethod> methods;
   if (maps.empty()) {
-    methods = makeMethods(base, variants);
+    const std::optional<QualityParameters> quality = qualityOf(mode);
+    if (with_ablation && !quality) throw std::invalid_argument("--ablation is for --mode quality");
+    if (with_ablation && variants.size() > 1) throw std::invalid_argument("--ablation is for one variant");
+    methods = makeMethods(base, variants, quality, with_ablation);
     if (!name.empty()) throw std::invalid_argument("--name is for --maps");
   } else {
     refuseWithMaps(values);
