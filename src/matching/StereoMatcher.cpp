@@ -197,8 +197,8 @@ cv::Range StereoMatcher::matchCensus(const cv::Mat& left, const cv::Mat& right) 
     fixed_point_.colRange(std::max(left.cols + std::min(min, 0), 0), left.cols) = FIXED_POINT_INVALID;
   }
   if (parameters_.speckle_size > 0) {
-    cv::filterSpeckles(fixed_point_, FIXED_POINT_INVALID, parameters_.speckle_size,
-                       parameters_.speckle_range * SUBPIXEL_STEPS, speckle_buffer_);
+    speckle_filter_.apply(fixed_point_, FIXED_POINT_INVALID, parameters_.speckle_size,
+                          parameters_.speckle_range * SUBPIXEL_STEPS);
   }
   return {0, left.cols};
 }

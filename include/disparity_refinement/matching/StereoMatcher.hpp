@@ -5,6 +5,7 @@
 
 #include "disparity_refinement/DisparityRange.hpp"
 #include "disparity_refinement/matching/CensusSgm.hpp"
+#include "disparity_refinement/matching/SpeckleFilter.hpp"
 
 namespace disparity_refinement {
 
@@ -104,7 +105,8 @@ class StereoMatcher {
   MatchingParameters parameters_;
   cv::Ptr<cv::StereoMatcher> block_matcher_;
   CensusSgm census_matcher_;
-  cv::Mat padded_left_, padded_right_, fixed_point_, speckle_buffer_;
+  SpeckleFilter speckle_filter_;
+  cv::Mat padded_left_, padded_right_, fixed_point_;
 };
 
 }  // namespace disparity_refinement
