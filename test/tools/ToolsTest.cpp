@@ -127,6 +127,29 @@ TEST_F(Tools, evaluateRunsEveryMatcherOnceInAnyOrderOfTheVariants) {
   }
 }
 
+TEST_F(Tools, evaluateRefinesBeyondThePaper) {
+  const std::string settings = training + " --disparity_range 64 --full_width true --frames 0 --mode quality";
+  const Outcome outcome = run("evaluate " + settings + " --ablation --json " + out("a.json"));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.text;
+  // The matcher, the planes, five more steps, and five times all steps but one.
+  const std::string json = readText(out("a.json"));
+  int methods = 0;
+  for (auto at = json.find("\"name\""); at != std::string::npos; at = json.find("\"name\"", at + 1))
+    ++methods;
+  EXPECT_EQ(methods, 12);
+  for (const std::string name :
+       {"SGBM 3WAY + (30,5) quality: planes", "+ plane selection", "+ plane smoothing", "+ pixel labeling",
+        "+ soft output", "+ medians", "all without medians"}) {
+    EXPECT_NE(json.find("\"name\": \"" + name + "\""), std::string::npos) << name;
+  }
+
+  // There are no holes.
+  expectGood("evaluate " + settings + " --variant h=5 --write-maps " + out("maps"));
+  const cv::Mat map = cv::imread(out("maps/SGBM_3WAY_+_h=5_quality/000000_10.png"), cv::IMREAD_UNCHANGED);
+  ASSERT_FALSE(map.empty());
+  EXPECT_LE(static_cast<int>(map.total()) - cv::countNonZero(map), 1);
+}
+
 TEST_F(Tools, evaluateScoresMapsWithoutImages) {
   expectGood("evaluate " + training + " --disparity_range 64 --write-maps " + out("maps"));
   for (const char* name : {"image_0", "image_1", "calib"}) fs::remove_all(training + "/" + name);
@@ -168,6 +191,11 @@ TEST_F(Tools, evaluateExplainsWhatItCannotDo) {
   expectError("evaluate " + training + " --variant h=1 --maps x", "--variant and --maps exclude each other");
   expectError("evaluate " + training + " --lambda 1 --maps x", "--lambda and --maps exclude each other");
   expectError("evaluate " + training + " --name x", "--name is for --maps");
+  expectError("evaluate " + training + " --mode best", "mode is best, expected paper or quality");
+  expectError("evaluate " + training + " --ablation", "--ablation is for --mode quality");
+  expectError("evaluate " + training + " --mode quality --ablation --variant h=1 --variant h=2",
+              "--ablation is for one variant");
+  expectError("evaluate " + training + " --mode quality --maps x", "--mode and --maps exclude each other");
   expectError("evaluate " + training + " --json " + out("no/a.json"), "cannot write " + out("no/a.json"));
   expectError("evaluate " + training + " --params " + out("none.yaml"), "none.yaml");
   expectGood("evaluate " + training + " --disparity_range 64 --threads 100000");
@@ -223,6 +251,8 @@ TEST_F(Tools, refineWritesMapAndColoursByDefault) {
   const fs::path before = fs::current_path();
   fs::current_path(out(""));
   expectGood("refine " + pair());
+  expectGood("refine " + pair() + " --mode quality -o " + out("quality.png"));
+  expectError("refine " + pair() + " --mode best", "mode is best, expected paper or quality");
   fs::current_path(before);
   EXPECT_TRUE(fs::exists(out("disparity_refined.png")));
   EXPECT_TRUE(fs::exists(out("disparity_refined_color.png")));
