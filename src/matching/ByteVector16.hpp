@@ -97,6 +97,20 @@ inline ByteVector16 leastOfLanes(const ByteVector16& a) {
   return ByteVector16::all(v.get0());
 }
 
+/// Of all lanes.
+inline int sumOfLanes(const ByteVector16& a) {
+#if CV_SSE2 && !CV_SIMD128_CPP
+  const __m128i sums = _mm_sad_epu8(a.v.val, _mm_setzero_si128());  // Of eight bytes each.
+  return _mm_cvtsi128_si32(sums) + _mm_extract_epi16(sums, 4);
+#else
+  std::uint8_t bytes[ByteVector16::LANES];
+  a.store(bytes);
+  int sum = 0;
+  for (const std::uint8_t byte : bytes) sum += byte;
+  return sum;
+#endif
+}
+
 /// Bit i: whether lane i of a mask is set.
 inline std::uint32_t bitsOf(const ByteVector16& mask) {
   return static_cast<std::uint32_t>(cv::v_signmask(mask.v));

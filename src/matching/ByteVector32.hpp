@@ -74,6 +74,12 @@ inline ByteVector32 leastOfLanes(ByteVector32 a) {
   return ByteVector32(_mm256_broadcastb_epi8(_mm_minpos_epu16(v)));
 }
 
+inline int sumOfLanes(ByteVector32 a) {
+  const __m256i sums = _mm256_sad_epu8(a.v, _mm256_setzero_si256());  // Of eight bytes each.
+  const __m128i sum = _mm_add_epi64(_mm256_castsi256_si128(sums), _mm256_extracti128_si256(sums, 1));
+  return _mm_cvtsi128_si32(sum) + _mm_extract_epi16(sum, 4);
+}
+
 inline std::uint32_t bitsOf(ByteVector32 mask) {
   return static_cast<std::uint32_t>(_mm256_movemask_epi8(mask.v));
 }

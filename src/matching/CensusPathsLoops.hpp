@@ -269,8 +269,11 @@ class CensusPathsLoops {
         const Vector bounds = Vector::all(static_cast<std::uint8_t>(bound));
         // What fills the vectors is 255.
         int others = bound < 255 ? 0 : input.disparities - vectors * N;
-        for (int r = 0; r < vectors; ++r)
-          others += __builtin_popcount(bitsOf(equal(least(s.of[r], bounds), s.of[r])));
+        Vector count = Vector::all(0);
+        for (int r = 0; r < vectors; ++r) {
+          count = add(count, both(equal(least(s.of[r], bounds), s.of[r]), Vector::all(1)));
+        }
+        others += sumOfLanes(count);
         others -= (sum <= bound) + (d > 0 && before <= bound) + (d < last_disparity && after <= bound);
         winners.is_ambiguous[x] = others > 0;
       } else {
