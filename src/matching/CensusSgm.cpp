@@ -85,10 +85,11 @@ void CensusSgm::mirror(const cv::Mat (&planes)[3], int min_disparity, int thread
     const int first = width - 1 - min_disparity;
     for (int phase = 0; phase < vectors; ++phase) {
       std::uint8_t* to = mirrored + phase * length;
-      for (int i = 0; i < length; ++i) {
-        const int x = first - phase - i * vectors;
-        to[i] = x >= 0 && x < width ? row[x] : 0;
-      }
+      int i = 0, x = first - phase;
+      for (; i < length && x >= width; x -= vectors) to[i++] = 0;
+      const int end = x < 0 ? i : std::min(length, i + x / vectors + 1);
+      for (; i < end; x -= vectors) to[i++] = row[x];
+      std::fill(to + i, to + length, std::uint8_t{0});
     }
     for (int phase = vectors; phase < phases; ++phase) {
       const std::uint8_t* from = mirrored + (phase - vectors) * length;
