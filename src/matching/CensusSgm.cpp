@@ -234,7 +234,11 @@ void CensusSgm::compute(const cv::Mat& left, const cv::Mat& right, const CensusS
     }
   });
   cv::medianBlur(unchecked_, disparity, 3);
-  disparity.setTo(INVALID, is_bad_);
+  for (int y = 0; y < size.height; ++y) {
+    short* row = disparity.ptr<short>(y);
+    const std::uint8_t* is_bad = is_bad_.ptr<std::uint8_t>(y);
+    for (int x = 0; x < size.width; ++x) row[x] = is_bad[x] != 0 ? INVALID : row[x];
+  }
 }
 
 }  // namespace disparity_refinement
