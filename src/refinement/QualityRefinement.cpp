@@ -40,6 +40,7 @@ void validate(const QualityParameters& p) {
   requireCost(p.labeling.smoothness, "labeling.smoothness", 15.0);
   requirePositive(p.labeling.half_contrast, "labeling.half_contrast");
   requirePositive(p.labeling.step_truncation, "labeling.step_truncation");
+  requireCost(p.labeling.step_truncation, "labeling.step_truncation", 16.0);
   requireCost(p.labeling.smoothness * p.labeling.step_truncation, "labeling.smoothness * step_truncation",
               15.0);
   requireCost(p.labeling.soft_reach, "labeling.soft_reach", 1000.0);

@@ -12,8 +12,8 @@ namespace disparity_refinement {
 
 /// Parameters of PixelLabeling. Costs are in pixels of disparity error that cost as much.
 struct PixelLabelingParameters {
-  /// Cost of a pixel of distance to the measured disparity, >= 0, and the distance beyond which it costs no
-  /// more [px], > 0.
+  /// Cost of a pixel of distance to the measured disparity, 0...10, and the distance beyond which it costs no
+  /// more [px], > 0 and at most 16; their product is at most 15.
   double data_weight = 1.3;
   double data_truncation = 2.0;
   /// Cost of a neighbour's plane, >= 0, where the pixel has a measured disparity and where it has none.
@@ -24,8 +24,9 @@ struct PixelLabelingParameters {
   /// Cost of a disparity that leads to a place where the right camera sees something farther, >= 0: what is
   /// nearer would hide that.
   double visibility_cost = 1.0;
-  /// Cost of a pixel of step between two pixels of the same gray value, 0...3.5, the difference of gray
-  /// values at which it is half, > 0, and the step beyond which it costs no more [px], > 0 and at most 16.
+  /// Cost of a pixel of step between two pixels of the same gray value, 0...15, the difference of gray values
+  /// at which it is half, > 0, and the step beyond which it costs no more [px], > 0 and at most 16. The
+  /// largest cost of a step, the product of the first and the last, is at most 15.
   double smoothness = 2.0;
   double half_contrast = 10.0;
   double step_truncation = 4.0;
