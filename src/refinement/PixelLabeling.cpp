@@ -23,11 +23,11 @@ constexpr int STEPS = 16;  // Of a pixel, in disparities and costs.
 // Planes, or plane and measured disparity, that are nearer are the same [px].
 constexpr float SAME = 0.5F;
 // Cost of what is no candidate: more than any path adds up to.
-constexpr std::uint16_t NO_CANDIDATE = 16384;
+constexpr short NO_CANDIDATE = 16384;
 // Weights of steps are multiples of 1 / 256.
 constexpr int WEIGHT_SHIFT = 8;
 
-std::uint16_t inSteps(double value) { return static_cast<std::uint16_t>(std::lround(value * STEPS)); }
+short inSteps(double value) { return static_cast<short>(std::lround(value * STEPS)); }
 
 // A segment's first candidates.
 struct Planes {
@@ -60,46 +60,50 @@ cv::Rect boxOf(RunSpan runs) {
   return {left, top, right - left, bottom + 1 - top};
 }
 
-// One step of a path. All arrays are of CANDIDATES values.
+// One step of a path. All arrays are of CANDIDATES values. Signed numbers, for SSE2 has no minimum of
+// unsigned ones; the costs and their sums along a path are far below 2^15, and sums are cut there.
 class Step {
  public:
   explicit Step(const PixelLabelingParameters& p)
-      : truncation_(cv::v_setall_u16(inSteps(p.step_truncation))) {
+      : truncation_(cv::v_setall_s16(inSteps(p.step_truncation))) {
     for (int contrast = 0; contrast < 256; ++contrast) {
       const double weight = p.smoothness * p.half_contrast / (p.half_contrast + contrast);
       weights_[contrast] = static_cast<std::uint16_t>(std::lround(weight * (1 << WEIGHT_SHIFT)));
     }
   }
 
-  void start(const std::uint16_t* costs, std::uint16_t* path, std::uint16_t* sums) const {
-    const v_uint16x8 cost = cv::v_load(costs);
+  void start(const short* costs, short* path, short* sums) const {
+    const v_int16x8 cost = cv::v_load(costs);
     cv::v_store(path, cost);
     cv::v_store(sums, cv::v_load(sums) + cost);
   }
 
   // `path`: the values of the pixel before, which has `number_before` candidates, then those of this one.
   void advance(const short* before, int number_before, const short* disparities, int number,
-               const std::uint16_t* costs, int contrast, std::uint16_t* path, std::uint16_t* sums) const {
+               const short* costs, int contrast, short* path, short* sums) const {
     if (number < 2) {  // Nothing to choose: less the least one, its value is 0.
       path[0] = 0;
       return;
     }
     const v_int16x8 here = cv::v_load(disparities);
     const v_uint16x8 weight = cv::v_setall_u16(weights_[contrast]);
-    v_uint16x8 best = cv::v_setall_u16(std::numeric_limits<std::uint16_t>::max());
+    v_int16x8 best = cv::v_setall_s16(std::numeric_limits<short>::max());
     for (int j = 0; j < number_before; ++j) {
-      const v_uint16x8 step = cv::v_min(cv::v_absdiff(here, cv::v_setall_s16(before[j])), truncation_);
-      best = cv::v_min(best, cv::v_setall_u16(path[j]) + (cv::v_mul_wrap(step, weight) >> WEIGHT_SHIFT));
+      // Disparities are not negative: their difference is a positive 16-bit number.
+      const v_int16x8 distance = cv::v_reinterpret_as_s16(cv::v_absdiff(here, cv::v_setall_s16(before[j])));
+      const v_uint16x8 step = cv::v_reinterpret_as_u16(cv::v_min(distance, truncation_));
+      const v_uint16x8 step_cost = cv::v_mul_wrap(step, weight) >> WEIGHT_SHIFT;
+      best = cv::v_min(best, cv::v_setall_s16(path[j]) + cv::v_reinterpret_as_s16(step_cost));
     }
-    if (number_before == 0) best = cv::v_setzero_u16();
-    const v_uint16x8 value = cv::v_load(costs) + best;
-    const v_uint16x8 relative = value - cv::v_setall_u16(cv::v_reduce_min(value));
+    if (number_before == 0) best = cv::v_setzero_s16();
+    const v_int16x8 value = cv::v_load(costs) + best;
+    const v_int16x8 relative = value - cv::v_setall_s16(cv::v_reduce_min(value));
     cv::v_store(path, relative);
     cv::v_store(sums, cv::v_load(sums) + relative);
   }
 
  private:
-  v_uint16x8 truncation_;
+  v_int16x8 truncation_;
   std::array<std::uint16_t, 256> weights_;
 };
 
@@ -153,7 +157,7 @@ void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange
   for (const SegmentGraph::Border& border : strip.borders) planes.add(all_planes[border.neighbour], box);
 
   // Cost of the planes where something was measured, and where not.
-  std::array<std::uint16_t, CANDIDATES> with_measured, in_hole;
+  std::array<short, CANDIDATES> with_measured, in_hole;
   std::array<float, CANDIDATES> slope{};
   with_measured.fill(NO_CANDIDATE);
   in_hole.fill(NO_CANDIDATE);
@@ -162,8 +166,8 @@ void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange
     in_hole[i] = i == 0 ? 0 : inSteps(p.neighbour_cost_in_hole);
     slope[i] = static_cast<float>(planes.plane[i].a * STEPS);
   }
-  const std::uint16_t measured_cost = inSteps(p.measured_cost), visibility_cost = inSteps(p.visibility_cost);
-  const v_uint16x8 truncation = cv::v_setall_u16(inSteps(p.data_truncation));
+  const short measured_cost = inSteps(p.measured_cost), visibility_cost = inSteps(p.visibility_cost);
+  const v_uint16x8 truncation = cv::v_setall_u16(static_cast<std::uint16_t>(inSteps(p.data_truncation)));
   const v_uint16x8 data_weight =
       cv::v_setall_u16(static_cast<std::uint16_t>(std::lround(p.data_weight * (1 << WEIGHT_SHIFT))));
   const float largest = std::min((range.max - range.min) * STEPS, 32767.0F);
@@ -174,7 +178,7 @@ void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange
     const float* d = measured.ptr<float>(run.y);
     const float* right = right_.ptr<float>(run.y);
     short* disparities = disparities_.ptr<short>(run.y);
-    std::uint16_t* costs = costs_.ptr<std::uint16_t>(run.y);
+    short* costs = costs_.ptr<short>(run.y);
     std::uint8_t* numbers = numbers_.ptr<std::uint8_t>(run.y);
     // At the first pixel of the run; coordinates relative to it are small enough for single precision.
     std::array<float, CANDIDATES> first{};
@@ -188,15 +192,15 @@ void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange
       const cv::v_float32x4 high = cv::v_min(cv::v_max(first_high + slope_high * offset, zero), end);
       const v_int16x8 planes_here = cv::v_pack(cv::v_round(low), cv::v_round(high));
       short* candidate = disparities + x * CANDIDATES;
-      std::uint16_t* cost = costs + x * CANDIDATES;
+      short* cost = costs + x * CANDIDATES;
       cv::v_store(candidate, planes_here);
       int n = planes.size;
       if (range.isValid(d[x])) {
         const float value = std::min((d[x] - range.min) * STEPS, 32767.0F);
         const short own = static_cast<short>(std::floor(value + 0.5F));
         const v_uint16x8 distance = cv::v_min(cv::v_absdiff(planes_here, cv::v_setall_s16(own)), truncation);
-        cv::v_store(
-            cost, cv::v_load(with_measured.data()) + (cv::v_mul_wrap(distance, data_weight) >> WEIGHT_SHIFT));
+        const v_uint16x8 distance_cost = cv::v_mul_wrap(distance, data_weight) >> WEIGHT_SHIFT;
+        cv::v_store(cost, cv::v_load(with_measured.data()) + cv::v_reinterpret_as_s16(distance_cost));
         if (n == 0 || std::abs(candidate[0] - own) > SAME * STEPS) {
           candidate[n] = own;
           cost[n] = measured_cost;
@@ -212,7 +216,7 @@ void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange
         const float column = std::floor(static_cast<float>(x) - at + 0.5F);
         if (!(column >= 0.0F && column < static_cast<float>(measured.cols))) continue;
         if (right[static_cast<int>(column)] < at - 1.0F)
-          cost[i] = static_cast<std::uint16_t>(cost[i] + visibility_cost);
+          cost[i] = static_cast<short>(cost[i] + visibility_cost);
       }
     }
   }
@@ -223,13 +227,13 @@ void PixelLabeling::addPaths(const cv::Mat& gray, const PixelLabelingParameters&
   const int rows = gray.rows, cols = gray.cols;
   forEachStrip(strips, [&](int i) {
     const cv::Range part = stripOf(rows, i, strips);
-    std::array<std::uint16_t, CANDIDATES> path;
+    std::array<short, CANDIDATES> path;
     for (int y = part.start; y < part.end; ++y) {
       const short* disparities = disparities_.ptr<short>(y);
-      const auto* costs = costs_.ptr<std::uint16_t>(y);
-      auto* sums = sums_.ptr<std::uint16_t>(y);
+      const auto* costs = costs_.ptr<short>(y);
+      auto* sums = sums_.ptr<short>(y);
       const auto *numbers = numbers_.ptr<std::uint8_t>(y), *value = gray.ptr<std::uint8_t>(y);
-      std::fill(sums, sums + cols * CANDIDATES, std::uint16_t{0});
+      std::fill(sums, sums + cols * CANDIDATES, short{0});
       const auto walk = [&](int first, int end, int direction) {
         step.start(costs + first * CANDIDATES, path.data(), sums + first * CANDIDATES);
         for (int x = first + direction; x != end; x += direction) {
@@ -245,20 +249,20 @@ void PixelLabeling::addPaths(const cv::Mat& gray, const PixelLabelingParameters&
   });
   forEachStrip(strips, [&](int i) {
     const cv::Range part = stripOf(cols, i, strips);
-    std::vector<std::uint16_t>& paths = strips_[i].path;
+    std::vector<short>& paths = strips_[i].path;
     paths.resize(static_cast<std::size_t>(part.size()) * CANDIDATES);
     const auto walk = [&](int first, int end, int direction) {
       for (int y = first; y != end; y += direction) {
         const short* disparities = disparities_.ptr<short>(y);
-        const auto* costs = costs_.ptr<std::uint16_t>(y);
-        auto* sums = sums_.ptr<std::uint16_t>(y);
+        const auto* costs = costs_.ptr<short>(y);
+        auto* sums = sums_.ptr<short>(y);
         const auto *value = gray.ptr<std::uint8_t>(y), *numbers = numbers_.ptr<std::uint8_t>(y);
         const int before = y == first ? y : y - direction;
         const short* disparities_before = disparities_.ptr<short>(before);
         const auto *numbers_before = numbers_.ptr<std::uint8_t>(before),
                    *value_before = gray.ptr<std::uint8_t>(before);
         for (int x = part.start; x < part.end; ++x) {
-          std::uint16_t* path = paths.data() + (x - part.start) * CANDIDATES;
+          short* path = paths.data() + (x - part.start) * CANDIDATES;
           if (y == first) {
             step.start(costs + x * CANDIDATES, path, sums + x * CANDIDATES);
           } else {
@@ -287,7 +291,7 @@ void PixelLabeling::choose(const cv::Mat& measured, const DisparityRange& range,
       const auto* numbers = numbers_.ptr<std::uint8_t>(y);
       for (int x = 0; x < measured.cols; ++x) {
         const short* candidate = disparities_.ptr<short>(y) + x * CANDIDATES;
-        const std::uint16_t* sum = sums_.ptr<std::uint16_t>(y) + x * CANDIDATES;
+        const short* sum = sums_.ptr<short>(y) + x * CANDIDATES;
         const int n = numbers[x];
         if (n == 0) {
           out[x] = d[x];
@@ -316,8 +320,8 @@ void PixelLabeling::compute(const cv::Mat& measured, const cv::Mat& gray, const 
   strips_.resize(std::max<std::size_t>(strips_.size(), strips));
   const cv::Size all(measured.cols * CANDIDATES, measured.rows);
   disparities_.create(all, CV_16SC1);
-  costs_.create(all, CV_16UC1);
-  sums_.create(all, CV_16UC1);
+  costs_.create(all, CV_16SC1);
+  sums_.create(all, CV_16SC1);
   numbers_.create(measured.size(), CV_8UC1);
   numbers_ = 0;
   mirror(measured, range, strips);

@@ -64,7 +64,7 @@ class PixelLabeling {
   // Buffers of a strip.
   struct Strip {
     std::vector<SegmentGraph::Border> borders;
-    std::vector<std::uint16_t> path;
+    std::vector<short> path;
   };
 
   void mirror(const cv::Mat& measured, const DisparityRange& range, int strips);
