@@ -9,8 +9,8 @@
 
 namespace disparity_refinement {
 
-void PlaneFitting::fit(const cv::Mat& disparity, const DisparityRange& range,
-                       const PlaneRefinementParameters& parameters, const Visit& visit) {
+void PlaneFitting::fitAll(const cv::Mat& disparity, const DisparityRange& range,
+                          const PlaneRefinementParameters& parameters, const Visit& visit) {
   growTo(planes_, segments_.size());  // Room for more, but no more planes than segments.
   planes_.resize(segments_.size());
   const int threads = std::max(1, cv::getNumThreads());
