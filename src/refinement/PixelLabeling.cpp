@@ -8,6 +8,7 @@
 #include <limits>
 #include <opencv2/core/hal/intrin.hpp>
 
+#include "disparity_refinement/buffers.hpp"
 #include "disparity_refinement/strips.hpp"
 
 namespace disparity_refinement {
@@ -19,7 +20,8 @@ using cv::v_uint16x8;
 // Candidates of a pixel, one vector of them; the last one may be the measured disparity.
 constexpr int CANDIDATES = 8;
 constexpr int MAX_PLANES = CANDIDATES - 1;
-constexpr int STEPS = 16;  // Of a pixel, in disparities and costs.
+constexpr int USUAL_BORDERS = 256;  // Of a segment; more are an allocation now and then.
+constexpr int STEPS = 16;           // Of a pixel, in disparities and costs.
 // Planes, or plane and measured disparity, that are nearer are the same [px].
 constexpr float SAME = 0.5F;
 // Cost of what is no candidate: more than any path adds up to.
@@ -108,14 +110,13 @@ class Step {
 };
 
 // 2^(-x / half) for x = 0, 1, 2...; between the powers of 2 on straight lines, which all machines draw alike.
-std::vector<float> halvings(int half) {
-  std::vector<float> weights;
+void findHalvings(int half, std::vector<float>& weights) {
+  weights.clear();
   for (float power = 1.0F; power > 1e-6F; power /= 2.0F) {
     for (int i = 0; i < half; ++i) {
       weights.push_back(power * (1.0F - 0.5F * static_cast<float>(i) / static_cast<float>(half)));
     }
   }
-  return weights;
 }
 
 }  // namespace
@@ -150,6 +151,7 @@ void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange
   Planes planes;
   planes.add(all_planes[label], box);
   const SegmentGraph::Borders borders = graph.bordersOf(label);
+  growTo(strip.borders, borders.end() - borders.begin(), USUAL_BORDERS);
   strip.borders.assign(borders.begin(), borders.end());
   std::sort(strip.borders.begin(), strip.borders.end(), [](const auto& a, const auto& b) {
     return a.length() != b.length() ? a.length() > b.length() : a.neighbour < b.neighbour;
@@ -280,8 +282,6 @@ void PixelLabeling::addPaths(const cv::Mat& gray, const PixelLabelingParameters&
 
 void PixelLabeling::choose(const cv::Mat& measured, const DisparityRange& range,
                            const PixelLabelingParameters& p, int strips, cv::Mat& result) const {
-  // The sums are of four paths.
-  const std::vector<float> weights = halvings(std::max(1, 4 * inSteps(p.half_cost)));
   const int reach = inSteps(p.soft_reach);
   forEachStrip(strips, [&](int strip) {
     const cv::Range rows = stripOf(measured.rows, strip, strips);
@@ -302,9 +302,9 @@ void PixelLabeling::choose(const cv::Mat& measured, const DisparityRange& range,
         float total = 0.0F, weighted = 0.0F;
         for (int i = 0; i < n; ++i) {
           const std::size_t dearer = sum[i] - sum[best];
-          if (std::abs(candidate[i] - candidate[best]) > reach || dearer >= weights.size()) continue;
-          total += weights[dearer];
-          weighted += weights[dearer] * static_cast<float>(candidate[i]);
+          if (std::abs(candidate[i] - candidate[best]) > reach || dearer >= weights_.size()) continue;
+          total += weights_[dearer];
+          weighted += weights_[dearer] * static_cast<float>(candidate[i]);
         }
         out[x] = range.min + weighted / total / STEPS;
       }
@@ -324,6 +324,8 @@ void PixelLabeling::compute(const cv::Mat& measured, const cv::Mat& gray, const 
   sums_.create(all, CV_16SC1);
   numbers_.create(measured.size(), CV_8UC1);
   numbers_ = 0;
+  // The sums are of four paths.
+  findHalvings(std::max(1, 4 * inSteps(parameters.half_cost)), weights_);
   mirror(measured, range, strips);
   forEachStrip(strips, [&](int i) {
     const cv::Range part = stripOf(segments.size(), i, strips);

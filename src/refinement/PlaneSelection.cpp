@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "disparity_refinement/buffers.hpp"
+
 namespace disparity_refinement {
 namespace {
 
@@ -37,8 +39,10 @@ double borderCost(const SegmentGraph& graph, const SegmentGraph::Border& border,
 }  // namespace
 
 void selectPlanes(const SegmentGraph& graph, const std::vector<SegmentSupport>& support,
-                  const PlaneSelectionParameters& parameters, std::vector<DisparityPlane>& planes) {
-  const std::vector<DisparityPlane> fitted = planes;
+                  const PlaneSelectionParameters& parameters, const std::vector<DisparityPlane>& fitted,
+                  std::vector<DisparityPlane>& planes) {
+  growTo(planes, fitted.size());
+  planes = fitted;
   const int segments = static_cast<int>(planes.size());
   for (int sweep = 0; sweep < parameters.sweeps; ++sweep) {
     for (int i = 0; i < segments; ++i) {

@@ -84,16 +84,16 @@ void QualityRefinement::refine(const cv::Mat& disparity, const cv::Mat& labels, 
   copyValid(disparity, range, measured_);
   const int segments = fitting_.segments().size();
   growTo(support_, segments);
-  growTo(planes_, segments);
-  planes_.resize(segments);
+  growTo(fitted_, segments);
+  fitted_.resize(segments);
   fitting_.fit(measured_, range, parameters.fit,
                [&](int label, const SegmentPlane& plane, const SegmentPoints& points) {
                  support_[label].valid = support_[label].size = 0;
                  if (plane.pixels > 0) support_[label].sample(points);
-                 planes_[label] = {plane.a, plane.b, plane.c, plane.status == PlaneStatus::ACCEPTED};
+                 fitted_[label] = {plane.a, plane.b, plane.c, plane.status == PlaneStatus::ACCEPTED};
                });
   graph_.build(labels, gray, segments, parameters.half_contrast);
-  selectPlanes(graph_, support_, parameters.selection, planes_);
+  selectPlanes(graph_, support_, parameters.selection, fitted_, planes_);
   smoothPlanes(fitting_.segments(), graph_, support_, parameters.smoothing, planes_);
 
   refined.create(disparity.size(), CV_32FC1);

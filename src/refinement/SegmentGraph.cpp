@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <cstdlib>
 
+#include "disparity_refinement/buffers.hpp"
+
 namespace disparity_refinement {
 
 void SegmentGraph::findContacts(const cv::Mat& labels, const cv::Mat& gray, double half_contrast) {
@@ -36,9 +38,11 @@ void SegmentGraph::findContacts(const cv::Mat& labels, const cv::Mat& gray, doub
 // By the lower and then by the higher label; contacts of the same two stay in raster order.
 void SegmentGraph::sortContacts(int segments) {
   const auto sortBy = [&](int Contact::*label) {
+    growTo(counts_, segments + 1);
     counts_.assign(segments + 1, 0);
     for (const Contact& contact : contacts_) ++counts_[contact.*label + 1];
     for (int i = 0; i < segments; ++i) counts_[i + 1] += counts_[i];
+    growTo(sorted_, contacts_.size());
     sorted_.resize(contacts_.size());
     for (const Contact& contact : contacts_) sorted_[counts_[contact.*label]++] = contact;
     contacts_.swap(sorted_);
@@ -52,7 +56,7 @@ void SegmentGraph::build(const cv::Mat& labels, const cv::Mat& gray, int segment
   sortContacts(segments);
 
   const int size = static_cast<int>(contacts_.size());
-  points_.resize(size);
+  growTo(points_, size);
   for (int i = 0; i < size; ++i) points_[i] = contacts_[i].point;
   const auto forEachBorder = [&](const auto& visit) {
     int end = 0;
@@ -63,13 +67,14 @@ void SegmentGraph::build(const cv::Mat& labels, const cv::Mat& gray, int segment
     }
   };
   // Counted two places further on, so that placing the borders moves the counts to where they belong.
+  growTo(first_border_, segments + 2);
   first_border_.assign(segments + 2, 0);
   forEachBorder([&](int low, int high, int, int) {
     ++first_border_[low + 2];
     ++first_border_[high + 2];
   });
   for (int i = 2; i < segments + 2; ++i) first_border_[i] += first_border_[i - 1];
-  borders_.resize(first_border_[segments + 1]);
+  growTo(borders_, first_border_[segments + 1]);
   // Those to lower labels first: a border is met in the order of its lower label.
   forEachBorder([&](int low, int high, int first, int end) {
     borders_[first_border_[low + 1]++] = {high, first, end};

@@ -26,8 +26,8 @@ PlaneScene stripes(int segments, int width = 10, int height = 12) {
 }
 
 std::vector<DisparityPlane> select(const PlaneScene& scene, const PlaneSelectionParameters& parameters = {}) {
-  std::vector<DisparityPlane> planes = scene.planes;
-  selectPlanes(scene.graph, scene.support, parameters, planes);
+  std::vector<DisparityPlane> planes;
+  selectPlanes(scene.graph, scene.support, parameters, scene.planes, planes);
   return planes;
 }
 
@@ -194,9 +194,9 @@ TEST(PlaneSelection, leavesWhatIsUnknownEverywhere) {
   scene.measured.setTo(20.0F);
   scene.prepare();
   for (const DisparityPlane& plane : select(scene)) expectPlane(plane, UNKNOWN);
-  std::vector<DisparityPlane> none;
-  selectPlanes(scene.graph, {}, {}, none);
-  EXPECT_TRUE(none.empty());
+  std::vector<DisparityPlane> planes(3);
+  selectPlanes(scene.graph, {}, {}, {}, planes);
+  EXPECT_TRUE(planes.empty());
 }
 
 TEST(PlaneSelection, leavesSegmentsThatNoKnownPlaneReaches) {

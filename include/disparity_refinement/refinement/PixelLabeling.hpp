@@ -79,6 +79,7 @@ class PixelLabeling {
   cv::Mat disparities_, costs_;  // Of the candidates of every pixel [1/16 px].
   cv::Mat sums_;                 // Of the four paths.
   cv::Mat numbers_;              // Of candidates.
+  std::vector<float> weights_;   // Of candidates in the result, by how much dearer their sums are.
   std::vector<Strip> strips_;
 };
 

@@ -27,8 +27,10 @@ struct PlaneSelectionParameters {
 /// The segments choose one after the other, each with the present choices of the others (iterated
 /// conditional modes: Besag, J. R. Stat. Soc. B 1986), every second time in reverse order.
 ///
-/// @param planes  One a segment; those that are known before are proposals, those chosen come back.
+/// @param fitted  One a segment.
+/// @param planes  Those chosen; a vector of its own.
 void selectPlanes(const SegmentGraph& graph, const std::vector<SegmentSupport>& support,
-                  const PlaneSelectionParameters& parameters, std::vector<DisparityPlane>& planes);
+                  const PlaneSelectionParameters& parameters, const std::vector<DisparityPlane>& fitted,
+                  std::vector<DisparityPlane>& planes);
 
 }  // namespace disparity_refinement

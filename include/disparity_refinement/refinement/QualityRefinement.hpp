@@ -63,7 +63,7 @@ class QualityRefinement {
   PlaneFitting fitting_;
   SegmentGraph graph_;
   std::vector<SegmentSupport> support_;
-  std::vector<DisparityPlane> planes_;
+  std::vector<DisparityPlane> fitted_, planes_;
   PixelLabeling labeling_;
   cv::Mat measured_, chosen_;
 };
