@@ -12,6 +12,7 @@
 #include "disparity_refinement/evaluation/SyntheticStreet.hpp"
 #include "disparity_refinement/matching/StereoMatcher.hpp"
 #include "disparity_refinement/refinement/PlaneRefinement.hpp"
+#include "disparity_refinement/refinement/QualityRefinement.hpp"
 #include "disparity_refinement/segmentation/Segmentation.hpp"
 
 namespace disparity_refinement {
@@ -140,6 +141,38 @@ TEST_F(Allocation, isDoneByThePlaneRefinementForTheFirstFramesOnly) {
     startCounting();
     refine(i);
     EXPECT_EQ(0, stopCounting().count) << "frame " << i;
+  }
+}
+
+TEST_F(Allocation, isDoneByTheQualityRefinementForTheFirstFramesOnly) {
+  const std::vector<StreetFrame> frames = streetFrames(4);
+  StereoMatcher matcher;
+  Segmentation segmentation;
+  std::vector<cv::Mat> disparities(frames.size()), labels(frames.size());
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    matcher.compute(frames[i].left, frames[i].right, disparities[i]);
+    segmentation.compute(frames[i].left, {}, labels[i]);
+  }
+  for (const bool label_pixels : {true, false}) {
+    QualityParameters parameters;
+    parameters.label_pixels = label_pixels;
+    QualityRefinement refinement;
+    cv::Mat refined(labels[0].size(), CV_32FC1);
+    const auto refine = [&](std::size_t i) {
+      refinement.refine(disparities[i], labels[i], frames[i].left, matcher.range(), parameters, refined);
+    };
+    startCounting();
+    refine(0);
+    refine(1);
+    const double bytes_per_pixel = static_cast<double>(stopCounting().growth) / refined.total();
+    RecordProperty(label_pixels ? "bytes_per_pixel" : "bytes_per_pixel_without_labels",
+                   std::to_string(bytes_per_pixel));
+    EXPECT_LE(bytes_per_pixel, label_pixels ? 100.0 : 50.0);
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      startCounting();
+      refine(i);
+      EXPECT_EQ(0, stopCounting().count) << "frame " << i << ", label_pixels " << label_pixels;
+    }
   }
 }
 
