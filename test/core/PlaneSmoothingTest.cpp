@@ -237,7 +237,6 @@ TEST(PlaneSmoothing, isRegularForSegmentsOnALine) {
 }
 
 TEST(PlaneSmoothing, isExactFarFromTheOrigin) {
-  // The normal equations are about the segment, not about the corner of the image.
   PlaneScene scene({2000, 8});
   scene.labels.setTo(-1);
   scene.labels.colRange(1990, 2000).setTo(0);
