@@ -5,6 +5,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "benchmarks.hpp"
+#include "disparity_refinement/matching/SpeckleFilter.hpp"
 #include "disparity_refinement/matching/StereoMatcher.hpp"
 
 #ifdef HAVE_XIMGPROC
@@ -41,6 +42,7 @@ MatchingParameters censusParameters() {
   parameters.stereo_algorithm = StereoAlgorithm::CENSUS_SGM;
   parameters.disparity_range = DISPARITIES;
   parameters.full_width = true;
+  parameters.uniqueness_ratio = 0;
   return parameters;
 }
 
@@ -55,14 +57,15 @@ class MatcherOf16ByteVectors {
     parameters.uniqueness_ratio = common.uniqueness_ratio;
     parameters.disp12_max_diff = common.disp12MaxDiff;
     matcher_.compute(left, right, parameters, fixed_point_);
-    cv::filterSpeckles(fixed_point_, CensusSgm::INVALID, common.speckle_size,
-                       common.speckle_range * CensusSgm::SUBPIXEL_STEPS, speckle_buffer_);
+    speckle_filter_.apply(fixed_point_, CensusSgm::INVALID, common.speckle_size,
+                          common.speckle_range * CensusSgm::SUBPIXEL_STEPS);
     fixed_point_.convertTo(disparity, CV_32F, 1.0 / CensusSgm::SUBPIXEL_STEPS);
   }
 
  private:
   CensusSgm matcher_{CensusSgm::Vectors::BYTES_16};
-  cv::Mat fixed_point_, speckle_buffer_;
+  SpeckleFilter speckle_filter_;
+  cv::Mat fixed_point_;
 };
 
 #ifdef HAVE_XIMGPROC

@@ -12,12 +12,12 @@
 #include <cstdlib>
 #include <functional>
 #include <iostream>
-#include <opencv2/calib3d.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "Frames.hpp"
 #include "disparity_refinement/evaluation/KittiFiles.hpp"
 #include "disparity_refinement/matching/CensusSgm.hpp"
+#include "disparity_refinement/matching/SpeckleFilter.hpp"
 #include "disparity_refinement/refinement/PlaneRefinement.hpp"
 #include "disparity_refinement/segmentation/Segmentation.hpp"
 
@@ -51,13 +51,13 @@ void match(const std::string& folder, int n) {
   const cv::Mat left = readGrayImage(folder + "/left.png"), right = readGrayImage(folder + "/right.png");
   CensusSgmParameters parameters;
   parameters.disparity_range = DISPARITIES;
-  parameters.uniqueness_ratio = 10;
-  cv::Mat disparity(left.size(), CV_16SC1), speckle_buffer;
+  cv::Mat disparity(left.size(), CV_16SC1);
   CensusSgm matcher(CensusSgm::Vectors::BYTES_16);
+  SpeckleFilter speckle_filter;
   printScratch(left, [&] {
     for (int i = 0; i < n; ++i) {
       matcher.compute(left, right, parameters, disparity);
-      cv::filterSpeckles(disparity, CensusSgm::INVALID, 100, 2 * CensusSgm::SUBPIXEL_STEPS, speckle_buffer);
+      speckle_filter.apply(disparity, CensusSgm::INVALID, 100, 2 * CensusSgm::SUBPIXEL_STEPS);
     }
   });
 }
