@@ -16,13 +16,13 @@ struct PixelLabelingParameters {
   /// more [px], > 0 and at most 16; their product is at most 15.
   double data_weight = 1.3;
   double data_truncation = 2.0;
-  /// Cost of a neighbour's plane, >= 0, where the pixel has a measured disparity and where it has none.
+  /// Cost of a neighbour's plane, 0...100, where the pixel has a measured disparity and where it has none.
   double neighbour_cost = 1.2;
   double neighbour_cost_in_hole = 0.5;
-  /// Cost of keeping the measured disparity, >= 0.
+  /// Cost of keeping the measured disparity, 0...100.
   double measured_cost = 1.5;
-  /// Cost of a disparity that leads to a place where the right camera sees something farther, >= 0: what is
-  /// nearer would hide that.
+  /// Cost of a disparity that leads to a place where the right camera sees something farther, 0...100: what
+  /// is nearer would hide that.
   double visibility_cost = 1.0;
   /// Cost of a pixel of step between two pixels of the same gray value, 0...15, the difference of gray values
   /// at which it is half, > 0, and the step beyond which it costs no more [px], > 0 and at most 16. The
@@ -30,8 +30,8 @@ struct PixelLabelingParameters {
   double smoothness = 2.0;
   double half_contrast = 10.0;
   double step_truncation = 4.0;
-  /// Candidates near the best one take part in the result: those within soft_reach [px], >= 0, with a weight
-  /// that halves with every half_cost by which they are dearer, > 0.
+  /// Candidates near the best one take part in the result: those within soft_reach [px], 0...1000, with a
+  /// weight that halves with every half_cost by which they are dearer, > 0 and at most 100.
   double soft_reach = 4.0;
   double half_cost = 1.5;
 };
@@ -45,9 +45,10 @@ struct PixelLabelingParameters {
 /// result is the weighted mean of the winner and the candidates near it.
 ///
 /// Planes of a segment that differ by less than 1/2 px all over it are one candidate, and so is a measured
-/// disparity so near to the first plane: most pixels of roads and walls have one candidate only.
+/// disparity within 1/2 px of the first plane: many pixels of roads and walls have one candidate only.
 ///
-/// Works in steps of 1/16 px; the same bits for any number of threads. Buffers are kept between frames.
+/// Works in steps of 1/16 px in 16 bits: what is more than 2047 px above the least disparity is cut there.
+/// The same bits for any number of threads. Buffers are kept between frames.
 class PixelLabeling {
  public:
   /// @param measured  CV_32FC1 [px]; every pixel is valid or range.invalid().
