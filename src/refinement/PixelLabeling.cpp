@@ -109,10 +109,13 @@ class Step {
   std::array<std::uint16_t, 256> weights_;
 };
 
-// 2^(-x / half) for x = 0, 1, 2...; between the powers of 2 on straight lines, which all machines draw alike.
+// 2^(-x / half) for x = 0, 1, 2..., down to a millionth; between the powers of 2 on straight lines, which all
+// machines draw alike.
 void findHalvings(int half, std::vector<float>& weights) {
+  constexpr int HALVINGS = 20;
   weights.clear();
-  for (float power = 1.0F; power > 1e-6F; power /= 2.0F) {
+  for (int k = 0; k < HALVINGS; ++k) {
+    const float power = 1.0F / static_cast<float>(1 << k);
     for (int i = 0; i < half; ++i) {
       weights.push_back(power * (1.0F - 0.5F * static_cast<float>(i) / static_cast<float>(half)));
     }
