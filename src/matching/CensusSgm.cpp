@@ -162,10 +162,9 @@ void CensusSgm::computeBlock(const CensusPathsInput& input, const CensusSgmParam
 void CensusSgm::finishRow(const CensusPathsInput& input, const CensusSgmParameters& parameters, int y,
                           const std::uint8_t* sums, Strip& strip) {
   const int width = input.width;
-  const std::uint16_t* right = strip.right_winners.data() + input.disparities - 1;
+  std::uint16_t* right = strip.right_winners.data() + input.disparities - 1;
   functions_->findWinners(input, sums,
-                          {strip.winners.data(), strip.subpixel.data(), strip.is_ambiguous.data(),
-                           strip.right_winners.data() + input.disparities - 1});
+                          {strip.winners.data(), strip.subpixel.data(), strip.is_ambiguous.data(), right});
   short* disparity = unchecked_.ptr<short>(y);
   std::uint8_t* is_bad = is_bad_.ptr<std::uint8_t>(y);
   const int max_difference = parameters.disp12_max_diff < 0 ? MAX_DISPARITIES : parameters.disp12_max_diff;

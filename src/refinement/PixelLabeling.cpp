@@ -26,6 +26,7 @@ constexpr int STEPS = 16;           // Of a pixel, in disparities and costs.
 constexpr float SAME = 0.5F;
 // Cost of what is no candidate: more than any path adds up to.
 constexpr short NO_CANDIDATE = 16384;
+constexpr float LARGEST_DISPARITY = 32767.0F;  // In steps.
 // Weights of steps are multiples of 1 / 256.
 constexpr int WEIGHT_SHIFT = 8;
 
@@ -51,6 +52,12 @@ struct Planes {
     plane[size++] = added;
   }
 };
+
+// Where the right image shows what is in column x at disparity d; -1 outside of it.
+int columnInRight(int x, float d, int columns) {
+  const float column = std::floor(static_cast<float>(x) - d + 0.5F);
+  return column >= 0.0F && column < static_cast<float>(columns) ? static_cast<int>(column) : -1;
+}
 
 cv::Rect boxOf(RunSpan runs) {
   int left = std::numeric_limits<int>::max(), right = 0, top = runs.begin()->y, bottom = top;
@@ -134,9 +141,9 @@ void PixelLabeling::mirror(const cv::Mat& measured, const DisparityRange& range,
       std::fill(right, right + measured.cols, std::numeric_limits<float>::infinity());
       for (int x = 0; x < measured.cols; ++x) {
         if (!range.isValid(d[x])) continue;
-        const float column = std::floor(static_cast<float>(x) - d[x] + 0.5F);
-        if (!(column >= 0.0F && column < static_cast<float>(measured.cols))) continue;
-        float& seen = right[static_cast<int>(column)];
+        const int column = columnInRight(x, d[x], measured.cols);
+        if (column < 0) continue;
+        float& seen = right[column];
         // The nearest hides the others.
         if (seen == std::numeric_limits<float>::infinity() || seen < d[x]) seen = d[x];
       }
@@ -175,7 +182,7 @@ void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange
   const v_uint16x8 truncation = cv::v_setall_u16(static_cast<std::uint16_t>(inSteps(p.data_truncation)));
   const v_uint16x8 data_weight =
       cv::v_setall_u16(static_cast<std::uint16_t>(std::lround(p.data_weight * (1 << WEIGHT_SHIFT))));
-  const float largest = std::min((range.max - range.min) * STEPS, 32767.0F);
+  const float largest = std::min((range.max - range.min) * STEPS, LARGEST_DISPARITY);
   const cv::v_float32x4 zero = cv::v_setzero_f32(), end = cv::v_setall_f32(largest);
   const cv::v_float32x4 slope_low = cv::v_load(slope.data()), slope_high = cv::v_load(slope.data() + 4);
 
@@ -201,7 +208,7 @@ void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange
       cv::v_store(candidate, planes_here);
       int n = planes.size;
       if (range.isValid(d[x])) {
-        const float value = std::min((d[x] - range.min) * STEPS, 32767.0F);
+        const float value = std::min((d[x] - range.min) * STEPS, LARGEST_DISPARITY);
         const short own = static_cast<short>(std::floor(value + 0.5F));
         const v_uint16x8 distance = cv::v_min(cv::v_absdiff(planes_here, cv::v_setall_s16(own)), truncation);
         const v_uint16x8 distance_cost = cv::v_mul_wrap(distance, data_weight) >> WEIGHT_SHIFT;
@@ -218,10 +225,8 @@ void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange
       if (n < 2) continue;
       for (int i = 0; i < n; ++i) {
         const float at = range.min + static_cast<float>(candidate[i]) / STEPS;
-        const float column = std::floor(static_cast<float>(x) - at + 0.5F);
-        if (!(column >= 0.0F && column < static_cast<float>(measured.cols))) continue;
-        if (right[static_cast<int>(column)] < at - 1.0F)
-          cost[i] = static_cast<short>(cost[i] + visibility_cost);
+        const int column = columnInRight(x, at, measured.cols);
+        if (column >= 0 && right[column] < at - 1.0F) cost[i] = static_cast<short>(cost[i] + visibility_cost);
       }
     }
   }

@@ -9,9 +9,6 @@
 namespace disparity_refinement {
 namespace {
 
-// Points of a border that are looked at: more hardly change the choice.
-constexpr int BORDER_SAMPLES = 16;
-
 double supportCost(const SegmentSupport& support, const DisparityPlane& plane, double truncation) {
   const float a = static_cast<float>(plane.a), b = static_cast<float>(plane.b),
               c = static_cast<float>(plane.c), most = static_cast<float>(truncation);
@@ -26,10 +23,9 @@ double borderCost(const SegmentGraph& graph, const SegmentGraph::Border& border,
                   const DisparityPlane& neighbour, double truncation) {
   const float a = static_cast<float>(plane.a - neighbour.a), b = static_cast<float>(plane.b - neighbour.b),
               c = static_cast<float>(plane.c - neighbour.c), most = static_cast<float>(truncation);
-  const int stride = std::max(1, border.length() / BORDER_SAMPLES);
   float sum = 0.0F;
   int n = 0;
-  for (int i = border.first_point; i < border.end_point; i += stride, ++n) {
+  for (int i = border.first_point; i < border.end_point; i += border.stride(), ++n) {
     const SegmentGraph::BorderPoint& point = graph.point(i);
     sum += point.weight * std::min(std::abs(a * point.x + b * point.y + c), most);
   }

@@ -6,7 +6,6 @@
 namespace disparity_refinement {
 namespace {
 
-constexpr int BORDER_SAMPLES = 16;
 // Weight of the plane as it was, as a share of that of all observations.
 constexpr double INERTIA = 0.05;
 
@@ -90,7 +89,7 @@ void smoothPlanes(const SegmentRuns& segments, const SegmentGraph& graph,
       for (const SegmentGraph::Border& border : graph.bordersOf(segment)) {
         const DisparityPlane& neighbour = planes[border.neighbour];
         if (!neighbour.is_known) continue;
-        const int stride = std::max(1, border.length() / BORDER_SAMPLES);
+        const int stride = border.stride();
         const int samples = (border.length() + stride - 1) / stride;
         const double weight = parameters.border_weight * border.length() / samples;
         for (int i = border.first_point; i < border.end_point; i += stride) {

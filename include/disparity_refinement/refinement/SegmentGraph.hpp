@@ -22,6 +22,8 @@ class SegmentGraph {
     int first_point, end_point;  ///< Its points in raster order: point(first_point) ... point(end_point - 1).
 
     int length() const { return end_point - first_point; }
+    /// Distance of the points that are enough to look at: 16 or more of a long border, all of a short one.
+    int stride() const { return length() < 32 ? 1 : length() / 16; }
   };
 
   class Borders {
