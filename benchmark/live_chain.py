@@ -93,7 +93,7 @@ def launch(nodelets, bag, input_rate, frames, folder):
         process = subprocess.Popen(command, stdout=text, stderr=subprocess.STDOUT, start_new_session=True,
                                    env=dict(os.environ, ROS_MASTER_URI=f"http://localhost:{port}"))
         try:
-            process.wait(timeout=60 + 2 * frames / input_rate)
+            process.wait(timeout=120 + 2 * frames / input_rate)
         except subprocess.TimeoutExpired:
             pass
         finally:

@@ -1,6 +1,6 @@
-// A nodelet manager that notes when the images of a stereo pair arrive in it and when the disparity maps of
-// its nodelets are published. When nothing has moved for a while it writes them as JSON and ends. Started by
-// live_chain.launch.
+// A nodelet manager that starts a paused rosbag play when all its nodelets are loaded, and notes when the
+// images of a stereo pair arrive in it and when the disparity maps of its nodelets are published. When
+// nothing has moved for a while it writes them as JSON and ends. Started by live_chain.launch.
 //
 // The times are those that roscpp stamps on a message that it hands to a subscriber: on arrival from another
 // process, or inside publish() of a nodelet. So the thread that notes them may be late.
@@ -9,6 +9,7 @@
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <sensor_msgs/Image.h>
+#include <std_srvs/SetBool.h>
 #include <stereo_msgs/DisparityImage.h>
 #include <sys/resource.h>
 
@@ -98,10 +99,16 @@ class Probe {
 int main(int argc, char** argv) {
   ros::init(argc, argv, "manager");
   const ros::NodeHandle private_nh("~");
-  const nodelet::Loader loader;
+  nodelet::Loader loader;
   const disparity_refinement::Probe probe(private_nh.param("with_refinement", false));
   ros::AsyncSpinner spinner(1);
   spinner.start();
+  const auto nodelets = static_cast<std::size_t>(private_nh.param("nodelets", 1));
+  while (ros::ok() && loader.listLoadedNodelets().size() < nodelets) ros::WallDuration(0.1).sleep();
+  const std::string pause = private_nh.param<std::string>("player", "/play") + "/pause_playback";
+  std_srvs::SetBool resume;
+  resume.request.data = 0;
+  while (ros::ok() && !ros::service::call(pause, resume)) ros::WallDuration(0.1).sleep();
   constexpr double END_OF_BAG = 2.0;  // [s]
   while (ros::ok() && probe.silence() < END_OF_BAG) ros::WallDuration(0.1).sleep();
   probe.write(private_nh.param<std::string>("output", "live_chain.json"));
