@@ -17,7 +17,7 @@ void registerRefinement(const std::string& set, const std::string& name, int thr
 void registerQuality(const std::string& set, const std::string& name, int threads) {
   registerBenchmark(set, name, threads, [](const Frame& frame) {
     return [&frame, refinement = QualityRefinement(), refined = cv::Mat()]() mutable {
-      refinement.refine(frame.disparity, frame.labels, frame.left, frame.range, {}, refined);
+      refinement.refine(frame.disparity, frame.labels, frame.left, frame.range, {}, {}, refined);
     };
   });
 }

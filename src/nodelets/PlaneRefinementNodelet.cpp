@@ -4,23 +4,28 @@
 #include <stereo_msgs/DisparityImage.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 #include <stdexcept>
 #include <utility>
 
-#include "disparity_refinement/refinement/PlaneRefinement.hpp"
+#include "disparity_refinement/refinement/Confidence.hpp"
+#include "disparity_refinement/refinement/DisparityRefinement.hpp"
 #include "disparity_refinement/ros/FrameWorker.hpp"
+#include "disparity_refinement/ros/ImageSubscriber.hpp"
 #include "disparity_refinement/ros/LazyNodelet.hpp"
 #include "disparity_refinement/ros/LiveParameters.hpp"
 #include "disparity_refinement/ros/Messages.hpp"
+#include "disparity_refinement/ros/OptionalJoin.hpp"
 #include "disparity_refinement/ros/StageMonitor.hpp"
 #include "disparity_refinement/ros/StampJoin.hpp"
 
 namespace disparity_refinement {
 
-/// disparity, labels -> disparity_refined, planes, depth.
+/// disparity, labels, and with refinement_mode Quality left/image_rect -> disparity_refined, planes, depth,
+/// disparity_source, confidence.
 class PlaneRefinementNodelet : public LazyNodelet {
  public:
   ~PlaneRefinementNodelet() override {
@@ -28,31 +33,41 @@ class PlaneRefinementNodelet : public LazyNodelet {
     stop();
     disparity_subscriber_.shutdown();
     labels_subscriber_.shutdown();
+    image_subscriber_.shutdown();
     worker_.reset();
     monitor_.reset();
   }
 
  private:
   using Disparity = stereo_msgs::DisparityImage;
-  using Labels = sensor_msgs::Image;
+  using Image = sensor_msgs::Image;
   struct Frame {
     Disparity::ConstPtr disparity;
-    Labels::ConstPtr labels;
+    Image::ConstPtr labels;
+    Image::ConstPtr image;  // Null unless there is one with the same stamp and it is needed.
   };
 
   void onInit() override {
     ros::NodeHandle& nh = getNodeHandle();
     ros::NodeHandle& private_nh = getPrivateNodeHandle();
     monitor_ = std::make_unique<StageMonitor>(getName(), nh, private_nh);
-    parameters_ = std::make_unique<LiveParameters<PlaneRefinementConfig>>(private_nh);
+    parameters_ = std::make_unique<LiveParameters<PlaneRefinementConfig>>(private_nh, [this] { update(); });
     queue_size_ = std::max(1, private_nh.param("queue_size", 5));
     const auto cache_size = static_cast<std::size_t>(std::max(1, private_nh.param("cache_size", 30)));
     worker_ = std::make_unique<FrameWorker<Frame>>(queue_size_, *monitor_,
                                                    [this](const Frame& frame) { process(frame); });
-    join_ = std::make_unique<StampJoin<Disparity, Labels>>(
+    image_join_ = std::make_unique<OptionalJoin<Frame, Image>>(
+        cache_size, [this](Frame frame, const Image::ConstPtr& image) {
+          frame.image = image;
+          worker_->push(std::move(frame));
+        });
+    join_ = std::make_unique<StampJoin<Disparity, Image>>(
         cache_size,
-        [this](const Disparity::ConstPtr& disparity, const Labels::ConstPtr& labels) {
-          worker_->push({disparity, labels});
+        [this](const Disparity::ConstPtr& disparity, const Image::ConstPtr& labels) {
+          const Frame frame{disparity, labels, nullptr};
+          image_join_->addFrame(disparity->header.stamp, frame);
+          // Nothing to wait for.
+          if (!is_image_needed_) image_join_->flush();
         },
         [this](int messages) { unmatched_ += messages; });
     monitor_->addDiagnostics([this](diagnostic_updater::DiagnosticStatusWrapper& status) {
@@ -60,21 +75,40 @@ class PlaneRefinementNodelet : public LazyNodelet {
     });
     refined_publisher_ = advertise<Disparity>(nh, "disparity_refined");
     planes_publisher_ = advertise<Planes>(nh, "planes");
-    depth_publisher_ = advertise<sensor_msgs::Image>(nh, "depth");
+    depth_publisher_ = advertise<Image>(nh, "depth");
+    source_publisher_ = advertise<Image>(nh, "disparity_source");
+    confidence_publisher_ = advertise<Image>(nh, "confidence");
     monitor_->start();
     start();
   }
 
   void updateSubscriptions() override {
-    if (!isWanted(refined_publisher_) && !isWanted(planes_publisher_) && !isWanted(depth_publisher_)) {
+    bool is_wanted = false;
+    for (const ros::Publisher* publisher : {&refined_publisher_, &planes_publisher_, &depth_publisher_,
+                                            &source_publisher_, &confidence_publisher_}) {
+      is_wanted = isWanted(*publisher) || is_wanted;
+    }
+    if (!is_wanted) {
       disparity_subscriber_.shutdown();
       labels_subscriber_.shutdown();
       join_->clear();
-    } else if (!disparity_subscriber_) {
+      unsubscribeImage();
+      return;
+    }
+    if (parameters_->snapshot().mode == RefinementMode::PAPER) {
+      unsubscribeImage();
+    } else if (!image_subscriber_.isSubscribed()) {
+      is_image_needed_ = true;
+      // Before the labels, which are made of it.
+      image_subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect",
+                                  static_cast<std::uint32_t>(queue_size_),
+                                  [this](const Image::ConstPtr& image) { image_join_->addMessage(image); });
+    }
+    if (!disparity_subscriber_) {
       ros::NodeHandle& nh = getNodeHandle();
       const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
-      labels_subscriber_ = nh.subscribe<Labels>(
-          "labels", queue_size_, [this](const Labels::ConstPtr& labels) { join_->addSecond(labels); }, {},
+      labels_subscriber_ = nh.subscribe<Image>(
+          "labels", queue_size_, [this](const Image::ConstPtr& labels) { join_->addSecond(labels); }, {},
           hints);
       disparity_subscriber_ = nh.subscribe<Disparity>(
           "disparity", queue_size_,
@@ -82,9 +116,15 @@ class PlaneRefinementNodelet : public LazyNodelet {
     }
   }
 
+  void unsubscribeImage() {
+    is_image_needed_ = false;
+    image_subscriber_.shutdown();
+    image_join_->flush();
+  }
+
   void process(const Frame& frame) {
     const ros::WallTime begin = ros::WallTime::now();
-    const PlaneRefinementParameters parameters = parameters_->snapshot();
+    RefinementParameters parameters = parameters_->snapshot();
     const Disparity& in = *frame.disparity;
     const ros::Time& stamp = in.header.stamp;
     monitor_->traceReceived("disparity", stamp, in.image.data.data());
@@ -94,6 +134,12 @@ class PlaneRefinementNodelet : public LazyNodelet {
     const std::string labels_topic = getNodeHandle().resolveName("labels");
     const cv::Mat disparity = imageView(in.image, sensor_msgs::image_encodings::TYPE_32FC1, disparity_topic);
     const cv::Mat labels = imageView(*frame.labels, sensor_msgs::image_encodings::TYPE_32SC1, labels_topic);
+    const std::string image_topic = getNodeHandle().resolveName("left/image_rect");
+    cv_bridge::CvImageConstPtr gray;
+    if (parameters.mode == RefinementMode::QUALITY) {
+      gray = grayOf(frame, image_topic);
+      if (!gray) parameters.mode = RefinementMode::PAPER;
+    }
     const StereoGeometry geometry = disparityGeometry(in, disparity_topic);
     const DisparityRange range = disparityRange(in, disparity_topic);
 
@@ -103,10 +149,11 @@ class PlaneRefinementNodelet : public LazyNodelet {
     cv::Mat refined =
         imageView(message->image, sensor_msgs::image_encodings::TYPE_32FC1, "disparity_refined");
     try {
-      refinement_.refine(disparity, labels, range, geometry.focal_length * geometry.baseline, parameters,
-                         refined);
+      refinement_.refine(disparity, labels, gray ? gray->image : cv::Mat(), range,
+                         geometry.focal_length * geometry.baseline, parameters, refined);
     } catch (const std::invalid_argument& e) {
-      throw std::invalid_argument(disparity_topic + ", " + labels_topic + ": " + e.what());
+      throw std::invalid_argument(disparity_topic + ", " + labels_topic + (gray ? ", " + image_topic : "") +
+                                  ": " + e.what());
     }
     monitor_->published(stamp, (ros::WallTime::now() - begin).toSec() * 1e3);
     monitor_->tracePublished("disparity_refined", stamp, message->image.data.data());
@@ -117,6 +164,44 @@ class PlaneRefinementNodelet : public LazyNodelet {
     if (depth_publisher_.getNumSubscribers() > 0) {
       depth_publisher_.publish(depthImage(in.header, refined, range, geometry));
     }
+    publishConfidence(in.header, disparity, refined, labels, range);
+  }
+
+  void publishConfidence(const std_msgs::Header& header, const cv::Mat& disparity, const cv::Mat& refined,
+                         const cv::Mat& labels, const DisparityRange& range) {
+    const bool with_confidence = confidence_publisher_.getNumSubscribers() > 0;
+    if (!with_confidence && source_publisher_.getNumSubscribers() == 0) return;
+    const auto makeMono = [&] {
+      return makeImage(header, disparity.size(), sensor_msgs::image_encodings::MONO8);
+    };
+    const sensor_msgs::ImagePtr source_message = makeMono();
+    cv::Mat sources =
+        imageView(*source_message, sensor_msgs::image_encodings::MONO8, source_publisher_.getTopic());
+    findSources(disparity, refined, labels, range, refinement_.fittedPlanes(), sources);
+    source_publisher_.publish(source_message);
+    if (!with_confidence) return;
+    const sensor_msgs::ImagePtr message = makeMono();
+    cv::Mat confidence =
+        imageView(*message, sensor_msgs::image_encodings::MONO8, confidence_publisher_.getTopic());
+    findConfidence(sources, confidence);
+    confidence_publisher_.publish(message);
+  }
+
+  /// Null, with a warning, where the refinement has to do without: a good frame is worth more than the best
+  /// refinement.
+  cv_bridge::CvImageConstPtr grayOf(const Frame& frame, const std::string& topic) {
+    if (frame.image) {
+      without_image_ = 0;
+      monitor_->traceReceived("left/image_rect", frame.image->header.stamp, frame.image->data.data());
+      return grayImage(frame.image, topic);
+    }
+    // When the mode or a listener has just changed, frames are under way without.
+    if (++without_image_ > queue_size_) {
+      monitor_->warning("no image on " + topic +
+                        " with the stamp of the disparity map: refined as in the paper, expected the left "
+                        "image for refinement_mode Quality");
+    }
+    return nullptr;
   }
 
   /// The window of a foreign publisher, cut to the image; the whole image if nothing is left.
@@ -135,12 +220,17 @@ class PlaneRefinementNodelet : public LazyNodelet {
 
   std::unique_ptr<StageMonitor> monitor_;
   std::unique_ptr<LiveParameters<PlaneRefinementConfig>> parameters_;
-  PlaneRefinement refinement_;
+  DisparityRefinement refinement_;
   int queue_size_ = 5;
+  std::atomic<bool> is_image_needed_{false};
+  int without_image_ = 0;  // Frames in a row that needed one.
   long unmatched_ = 0;
-  ros::Publisher refined_publisher_, planes_publisher_, depth_publisher_;
-  std::unique_ptr<StampJoin<Disparity, Labels>> join_;
+  ros::Publisher refined_publisher_, planes_publisher_, depth_publisher_, source_publisher_,
+      confidence_publisher_;
+  std::unique_ptr<OptionalJoin<Frame, Image>> image_join_;
+  std::unique_ptr<StampJoin<Disparity, Image>> join_;
   ros::Subscriber disparity_subscriber_, labels_subscriber_;
+  ImageSubscriber image_subscriber_;
   std::unique_ptr<FrameWorker<Frame>> worker_;
 };
 

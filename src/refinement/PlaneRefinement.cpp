@@ -143,6 +143,8 @@ const char* toString(PlaneStatus status) {
       return "degenerate";
     case PlaneStatus::MAX_ITERATIONS:
       return "maximum number of iterations";
+    case PlaneStatus::OF_NEIGHBOUR:
+      return "of a neighbour";
   }
   return "unknown";
 }

@@ -17,7 +17,6 @@ void validate(const QualityParameters& p) {
   const auto requireCost = [](double value, const char* name, double max) {
     if (!(value >= 0.0 && value <= max)) requireArgument(false, name, value, "0..." + std::to_string(max));
   };
-  validate(p.fit);
   requirePositive(p.half_contrast, "half_contrast");
   requireArgument(p.selection.sweeps >= 0, "selection.sweeps", p.selection.sweeps, "at least 0");
   requirePositive(p.selection.data_truncation, "selection.data_truncation");
@@ -67,14 +66,15 @@ void QualityRefinement::takePlanes(const DisparityRange& range, double max_diver
 }
 
 void QualityRefinement::refine(const cv::Mat& disparity, const cv::Mat& labels, const cv::Mat& gray,
-                               const DisparityRange& range, const QualityParameters& parameters,
-                               cv::Mat& refined) {
+                               const DisparityRange& range, const PlaneRefinementParameters& fit,
+                               const QualityParameters& parameters, cv::Mat& refined) {
   requireImage(disparity, "disparity", CV_32FC1);
   requireImage(labels, "labels", CV_32SC1, disparity.size());
   requireImage(gray, "gray", CV_8UC1, disparity.size());
   requireArgument(std::isfinite(range.min), "range.min", range.min, "a finite number");
   requireArgument(std::isfinite(range.max) && range.max >= range.min, "range.max", range.max,
                   "a finite number, at least range.min");
+  validate(fit);
   validate(parameters);
   for (const cv::Mat* input : {&disparity, &labels, &gray}) {
     requireArgument(!overlap(refined, *input), "refined", "the memory of an input", "an image of its own");
@@ -86,12 +86,11 @@ void QualityRefinement::refine(const cv::Mat& disparity, const cv::Mat& labels, 
   growTo(support_, segments);
   growTo(fitted_, segments);
   fitted_.resize(segments);
-  fitting_.fit(measured_, range, parameters.fit,
-               [&](int label, const SegmentPlane& plane, const SegmentPoints& points) {
-                 support_[label].valid = support_[label].size = 0;
-                 if (plane.pixels > 0) support_[label].sample(points);
-                 fitted_[label] = {plane.a, plane.b, plane.c, plane.status == PlaneStatus::ACCEPTED};
-               });
+  fitting_.fit(measured_, range, fit, [&](int label, const SegmentPlane& plane, const SegmentPoints& points) {
+    support_[label].valid = support_[label].size = 0;
+    if (plane.pixels > 0) support_[label].sample(points);
+    fitted_[label] = {plane.a, plane.b, plane.c, plane.status == PlaneStatus::ACCEPTED};
+  });
   graph_.build(labels, gray, segments, parameters.half_contrast);
   selectPlanes(graph_, support_, parameters.selection, fitted_, planes_);
   smoothPlanes(fitting_.segments(), graph_, support_, parameters.smoothing, planes_);
@@ -104,7 +103,7 @@ void QualityRefinement::refine(const cv::Mat& disparity, const cv::Mat& labels, 
                       chosen);
   } else {
     measured_.copyTo(chosen);
-    takePlanes(range, parameters.fit.max_divergence, chosen);
+    takePlanes(range, fit.max_divergence, chosen);
   }
   // From one to the other and back; the last one is `refined`.
   for (int i = 0; i < parameters.medians; ++i) {

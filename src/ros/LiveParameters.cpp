@@ -86,20 +86,22 @@ SegmentationParameters toParameters(SegmentationConfig& config) {
   return parameters;
 }
 
-PlaneRefinementParameters toParameters(PlaneRefinementConfig& config) {
-  PlaneRefinementParameters parameters;
-  parameters.inlier_threshold = config.inlier_threshold;
-  parameters.confidence = config.confidence;
-  parameters.max_slope_x = config.max_slope_x;
-  parameters.max_slope_y = config.max_slope_y;
-  parameters.disparity_error = config.disparity_error;
-  parameters.max_depth_error = config.max_depth_error;
-  parameters.min_valid_fraction = config.min_valid_fraction;
-  parameters.min_valid_points = config.min_valid_points;
-  parameters.max_iterations = config.max_iterations;
-  parameters.max_divergence = config.max_divergence;
-  parameters.divergence_action = static_cast<DivergenceAction>(config.divergence_action);
-  parameters.out_of_range_action = static_cast<OutOfRangeAction>(config.out_of_range_action);
+RefinementParameters toParameters(PlaneRefinementConfig& config) {
+  RefinementParameters parameters;
+  parameters.mode = static_cast<RefinementMode>(config.refinement_mode);
+  PlaneRefinementParameters& planes = parameters.planes;
+  planes.inlier_threshold = config.inlier_threshold;
+  planes.confidence = config.confidence;
+  planes.max_slope_x = config.max_slope_x;
+  planes.max_slope_y = config.max_slope_y;
+  planes.disparity_error = config.disparity_error;
+  planes.max_depth_error = config.max_depth_error;
+  planes.min_valid_fraction = config.min_valid_fraction;
+  planes.min_valid_points = config.min_valid_points;
+  planes.max_iterations = config.max_iterations;
+  planes.max_divergence = config.max_divergence;
+  planes.divergence_action = static_cast<DivergenceAction>(config.divergence_action);
+  planes.out_of_range_action = static_cast<OutOfRangeAction>(config.out_of_range_action);
   return parameters;
 }
 

@@ -132,17 +132,12 @@ class FrameEvaluator {
 
     const StereoGeometry& geometry = frame.geometry;
     const DisparityRange range = matcher_.range(geometry.principal_point_offset);
-    const PlaneRefinementParameters refinement_parameters = parameters.refinement();
+    RefinementParameters refinement_parameters = parameters.refinement();
+    refinement_parameters.quality = method.quality;
     cv::Mat refined;
     figures.ms.refinement = timed([&] {
-      if (method.quality) {
-        QualityParameters quality_parameters = *method.quality;
-        quality_parameters.fit = refinement_parameters;
-        quality_refinement_.refine(disparity_, labels_, frame.left, range, quality_parameters, refined);
-      } else {
-        refinement_.refine(disparity_, labels_, range, geometry.focal_length * geometry.baseline,
-                           refinement_parameters, refined);
-      }
+      refinement_.refine(disparity_, labels_, frame.left, range, geometry.focal_length * geometry.baseline,
+                         refinement_parameters, refined);
     });
     map_ = roundToKittiPng(refined, range);
     if (options_.pictures.empty()) return;
@@ -170,8 +165,7 @@ class FrameEvaluator {
 
   StereoMatcher matcher_;
   Segmentation segmentation_;
-  PlaneRefinement refinement_;
-  QualityRefinement quality_refinement_;
+  DisparityRefinement refinement_;
   /// Parameters of what disparity_ and labels_ hold for this frame; null: nothing yet.
   const StageParameters *matched_ = nullptr, *segmented_ = nullptr;
   cv::Mat disparity_, labels_, map_;

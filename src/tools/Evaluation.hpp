@@ -2,7 +2,6 @@
 
 #include <functional>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,8 +18,8 @@ struct EvaluatedMethod {
   std::string maps;            ///< Folder with FRAME.png, KITTI's 16-bit PNG; empty: the maps are computed.
   StageParameters parameters;  ///< Of a computed method.
   bool is_refined = true;  ///< Of a computed method: with segmentation and refinement, or the matcher alone.
-  /// Of a refined method: the refinement beyond the paper, with the fit of `parameters`. None: the paper's.
-  std::optional<QualityParameters> quality;
+  QualityParameters
+      quality;  ///< Of a refined method whose `parameters` ask for the refinement beyond the paper.
 
   bool isComputed() const { return maps.empty(); }
   bool isRefined() const { return isComputed() && is_refined; }

@@ -140,6 +140,15 @@ void addConfigOptions(po::options_description& description, const std::set<std::
 
 }  // namespace
 
+void StageParameters::setMode(const std::string& mode) {
+  requireArgument(mode == "paper" || mode == "fast" || mode == "quality", "mode", mode,
+                  "paper, fast or quality");
+  plane_refinement_.refinement_mode =
+      static_cast<int>(mode == "quality" ? RefinementMode::QUALITY : RefinementMode::PAPER);
+  disparity_.full_width = mode != "paper";
+  if (mode == "fast") disparity_.stereo_algorithm = static_cast<int>(StereoAlgorithm::CENSUS_SGM);
+}
+
 void StageParameters::set(const std::string& name, const std::string& value) {
   YAML::Node node;
   try {
@@ -181,7 +190,7 @@ MatchingParameters StageParameters::matching() const { return checkedParameters(
 
 SegmentationParameters StageParameters::segmentation() const { return checkedParameters(segmentation_); }
 
-PlaneRefinementParameters StageParameters::refinement() const { return checkedParameters(plane_refinement_); }
+RefinementParameters StageParameters::refinement() const { return checkedParameters(plane_refinement_); }
 
 std::map<std::string, StageParameters::Value> StageParameters::values() const {
   std::map<std::string, Value> values = toValues(disparity_);
@@ -204,6 +213,9 @@ bool StageParameters::hasSameSegmentation(const StageParameters& other) const {
 
 void StageParameters::addOptions(po::options_description& description) {
   addFileOption(description);
+  description.add_options()("mode", po::value<std::string>()->value_name("MODE"),
+                            "paper (default); fast: the census matcher, full_width; quality: the refinement "
+                            "beyond the paper, full_width. File and options win over it");
   addConfigOptions<DisparityConfig>(description);
   addConfigOptions<SegmentationConfig>(description);
   addConfigOptions<PlaneRefinementConfig>(description);
@@ -215,6 +227,7 @@ void StageParameters::addSegmentationOptions(po::options_description& descriptio
 }
 
 void StageParameters::readOptions(const po::variables_map& options) {
+  if (options.count("mode") > 0) setMode(options["mode"].as<std::string>());
   if (options.count("params") > 0) {
     const auto file = options["params"].as<std::string>();
     for (const std::string& name : load(file)) {
@@ -224,11 +237,6 @@ void StageParameters::readOptions(const po::variables_map& options) {
   for (const auto& [name, value] : values()) {
     if (options.count(name) > 0) set(name, options[name].as<std::string>());
   }
-}
-
-std::optional<QualityParameters> qualityOf(const std::string& mode) {
-  requireArgument(mode == "paper" || mode == "quality", "mode", mode, "paper or quality");
-  return mode == "quality" ? std::optional<QualityParameters>(QualityParameters()) : std::nullopt;
 }
 
 std::string matcherName(const MatchingParameters& parameters) {

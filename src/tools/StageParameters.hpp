@@ -2,7 +2,6 @@
 
 #include <boost/program_options.hpp>
 #include <map>
-#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -11,8 +10,7 @@
 #include "disparity_refinement/PlaneRefinementConfig.h"
 #include "disparity_refinement/SegmentationConfig.h"
 #include "disparity_refinement/matching/StereoMatcher.hpp"
-#include "disparity_refinement/refinement/PlaneRefinement.hpp"
-#include "disparity_refinement/refinement/QualityRefinement.hpp"
+#include "disparity_refinement/refinement/DisparityRefinement.hpp"
 #include "disparity_refinement/segmentation/Segmentation.hpp"
 
 namespace disparity_refinement {
@@ -24,6 +22,10 @@ namespace disparity_refinement {
 class StageParameters {
  public:
   using Value = std::variant<bool, int, double>;
+
+  /// Sets what the launch files' argument `mode` stands for: "paper", "fast" or "quality". Throws
+  /// std::invalid_argument for other texts.
+  void setMode(const std::string& mode);
 
   /// Sets one parameter from its text. Throws std::invalid_argument that names parameter, value and range.
   void set(const std::string& name, const std::string& value);
@@ -37,7 +39,7 @@ class StageParameters {
   /// Each throws std::invalid_argument if the values do not fit to each other.
   MatchingParameters matching() const;
   SegmentationParameters segmentation() const;
-  PlaneRefinementParameters refinement() const;
+  RefinementParameters refinement() const;
 
   /// The values by their names.
   std::map<std::string, Value> values() const;
@@ -46,11 +48,12 @@ class StageParameters {
   bool hasSameMatching(const StageParameters& other) const;
   bool hasSameSegmentation(const StageParameters& other) const;
 
-  /// One option for every parameter under its name, and `params` for a YAML file.
+  /// One option for every parameter under its name, `params` for a YAML file and `mode`.
   static void addOptions(boost::program_options::options_description& description);
   /// The same for the segmentation alone, without what the tool sets itself: lambda and h.
   static void addSegmentationOptions(boost::program_options::options_description& description);
-  /// Loads the file, then sets what the command line has; warns on stderr about what in the file is unknown.
+  /// Sets the mode, loads the file, then sets what the command line has; warns on stderr about what in the
+  /// file is unknown.
   void readOptions(const boost::program_options::variables_map& options);
 
  private:
@@ -58,10 +61,6 @@ class StageParameters {
   SegmentationConfig segmentation_ = SegmentationConfig::__getDefault__();
   PlaneRefinementConfig plane_refinement_ = PlaneRefinementConfig::__getDefault__();
 };
-
-/// What --mode stands for: nothing for "paper", the refinement beyond it for "quality". Throws
-/// std::invalid_argument for other texts.
-std::optional<QualityParameters> qualityOf(const std::string& mode);
 
 /// "BM", "SGBM", "SGBM HH" or the like for SGBM's modes, "census SGM".
 std::string matcherName(const MatchingParameters& parameters);

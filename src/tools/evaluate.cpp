@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <iostream>
 #include <iterator>
-#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <thread>
@@ -136,17 +135,21 @@ std::vector<EvaluatedMethod> ablation(const EvaluatedMethod& complete) {
   const int steps = static_cast<int>(std::size(QUALITY_STEPS));
   for (int made = 0; made <= steps; ++made) {
     EvaluatedMethod method = complete;
-    for (int i = made; i < steps; ++i) QUALITY_STEPS[i].leaveOut(*method.quality);
+    for (int i = made; i < steps; ++i) QUALITY_STEPS[i].leaveOut(method.quality);
     method.name = made == 0 ? complete.name + ": planes" : "+ " + std::string(QUALITY_STEPS[made - 1].name);
     methods.push_back(method);
   }
   for (const QualityStep& step : QUALITY_STEPS) {
     EvaluatedMethod method = complete;
-    step.leaveOut(*method.quality);
+    step.leaveOut(method.quality);
     method.name = "all without " + std::string(step.name);
     methods.push_back(method);
   }
   return methods;
+}
+
+bool isQuality(const StageParameters& parameters) {
+  return parameters.refinement().mode == RefinementMode::QUALITY;
 }
 
 std::string refinedName(const StageParameters& parameters, const std::string& variant) {
@@ -159,7 +162,6 @@ std::string refinedName(const StageParameters& parameters, const std::string& va
 /// The refinement with every variant of the parameters; before it, once for every matcher among them, the
 /// matcher alone.
 std::vector<EvaluatedMethod> makeMethods(const StageParameters& base, std::vector<std::string> variants,
-                                         const std::optional<QualityParameters>& quality,
                                          bool with_ablation) {
   if (variants.empty()) variants.emplace_back();
   std::vector<EvaluatedMethod> methods;
@@ -186,8 +188,7 @@ std::vector<EvaluatedMethod> makeMethods(const StageParameters& base, std::vecto
       methods.push_back(matcher);
     }
     method.name = refinedName(method.parameters, variant);
-    if (quality) method.name += " quality";
-    method.quality = quality;
+    if (isQuality(method.parameters)) method.name += " quality";
     if (with_ablation) {
       const std::vector<EvaluatedMethod> steps = ablation(method);
       methods.insert(methods.end(), steps.begin(), steps.end());
@@ -203,10 +204,9 @@ void refuseWithMaps(const po::variables_map& values) {
   const auto refuse = [](const std::string& name) {
     throw std::invalid_argument("--" + name + " and --maps exclude each other");
   };
-  for (const char* name : {"variant", "params", "write-maps", "pictures"}) {
+  for (const char* name : {"variant", "params", "mode", "write-maps", "pictures"}) {
     if (values.count(name) > 0) refuse(name);
   }
-  if (!values["mode"].defaulted()) refuse("mode");
   if (!values["ablation"].defaulted()) refuse("ablation");
   for (const auto& parameter : StageParameters().values()) {
     if (values.count(parameter.first) > 0) refuse(parameter.first);
@@ -217,15 +217,13 @@ void run(int argc, char** argv) {
   EvaluationOptions options;
   options.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   std::vector<std::string> variants;
-  std::string frames, maps, name, json, csv, mode = "paper";
+  std::string frames, maps, name, json, csv;
   bool with_ablation = false;
   po::options_description description("Options");
   description.add_options()("frames", po::value(&frames)->value_name("LIST"),
                             "numbers of the frames, such as 0,4,100-120; default all")(
       "threads", po::value(&options.threads)->default_value(options.threads),
       "frames computed at the same time; the figures do not depend on it, the times are truest with 1")(
-      "mode", po::value(&mode)->default_value(mode)->value_name("MODE"),
-      "paper, or quality: the refinement beyond the paper")(
       "ablation", po::bool_switch(&with_ablation), "with --mode quality: its steps one after the other")(
       "variant", po::value(&variants)->value_name("NAME=VALUE[,NAME=VALUE...]"),
       "refine with these parameters instead; any number of times, all in one run")(
@@ -248,10 +246,9 @@ void run(int argc, char** argv) {
   base.readOptions(values);
   std::vector<EvaluatedMethod> methods;
   if (maps.empty()) {
-    const std::optional<QualityParameters> quality = qualityOf(mode);
-    if (with_ablation && !quality) throw std::invalid_argument("--ablation is for --mode quality");
+    if (with_ablation && !isQuality(base)) throw std::invalid_argument("--ablation is for --mode quality");
     if (with_ablation && variants.size() > 1) throw std::invalid_argument("--ablation is for one variant");
-    methods = makeMethods(base, variants, quality, with_ablation);
+    methods = makeMethods(base, variants, with_ablation);
     if (!name.empty()) throw std::invalid_argument("--name is for --maps");
   } else {
     refuseWithMaps(values);

@@ -126,7 +126,7 @@ void refinePair(const std::string& left_file, const std::string& right_file, Sta
     outputs.color = DEFAULT_COLOR;
   }
   if (!calibration) {
-    const double bound = parameters.refinement().disparity_error;
+    const double bound = parameters.refinement().planes.disparity_error;
     requireArgument(bound == PlaneRefinementParameters().disparity_error || bound == 0.0, "disparity_error",
                     bound, "--calibration, or --focal-length and --baseline, beside it");
     parameters.set("disparity_error", "0");
@@ -140,14 +140,9 @@ void refinePair(const std::string& left_file, const std::string& right_file, Sta
   requireArgument(std::isfinite(outputs.color_max) && outputs.color_max > range.min, "color-max",
                   outputs.color_max, "a number above the smallest disparity, " + std::to_string(range.min));
   const int segments = Segmentation().compute(left, parameters.segmentation(), result.labels);
-  if (std::optional<QualityParameters> quality = qualityOf(values["mode"].as<std::string>())) {
-    quality->fit = parameters.refinement();
-    QualityRefinement().refine(result.disparity, result.labels, left, range, *quality, result.refined);
-  } else {
-    PlaneRefinement().refine(result.disparity, result.labels, range,
-                             geometry.focal_length * geometry.baseline, parameters.refinement(),
-                             result.refined);
-  }
+  DisparityRefinement().refine(result.disparity, result.labels, left, range,
+                               geometry.focal_length * geometry.baseline, parameters.refinement(),
+                               result.refined);
   result.disparity_range = result.refined_range = range;
 
   // Told when everything is written.
@@ -193,8 +188,6 @@ void run(int argc, char** argv) {
       "pfm", file_value(outputs.pfm), "refined disparity as PFM")("ply", file_value(outputs.ply),
                                                                   "point cloud as PLY")(
       "picture", file_value(outputs.picture), "image, segments, disparity before and after in one picture")(
-      "mode", po::value<std::string>()->default_value("paper"),
-      "paper, or quality: the refinement beyond the paper")(
       "color-max", po::value(&outputs.color_max)->default_value(outputs.color_max),
       "disparity at the near end of the colour scale [px]")(
       "calibration", po::value<std::string>()->value_name("FILE"),

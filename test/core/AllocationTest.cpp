@@ -159,7 +159,7 @@ TEST_F(Allocation, isDoneByTheQualityRefinementForTheFirstFramesOnly) {
     QualityRefinement refinement;
     cv::Mat refined(labels[0].size(), CV_32FC1);
     const auto refine = [&](std::size_t i) {
-      refinement.refine(disparities[i], labels[i], frames[i].left, matcher.range(), parameters, refined);
+      refinement.refine(disparities[i], labels[i], frames[i].left, matcher.range(), {}, parameters, refined);
     };
     startCounting();
     refine(0);

@@ -201,6 +201,7 @@ TEST(PlaneRefinement, namesEveryStatus) {
   EXPECT_STREQ(toString(PlaneStatus::TOO_FEW_POINTS), "too few points");
   EXPECT_STREQ(toString(PlaneStatus::DEGENERATE), "degenerate");
   EXPECT_STREQ(toString(PlaneStatus::MAX_ITERATIONS), "maximum number of iterations");
+  EXPECT_STREQ(toString(PlaneStatus::OF_NEIGHBOUR), "of a neighbour");
 }
 
 // Condition 1

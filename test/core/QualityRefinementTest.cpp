@@ -18,6 +18,7 @@ namespace {
 const float NOT_A_NUMBER = std::numeric_limits<float>::quiet_NaN();
 const float INFINITE = std::numeric_limits<float>::infinity();
 const DisparityRange RANGE{0.0F, 128.0F};
+const PlaneRefinementParameters FIT;
 const float HOLE = -1.0F;
 
 struct Frame {
@@ -57,7 +58,7 @@ void addNoise(double sigma, cv::Mat& disparity) {
 cv::Mat refine(const Frame& frame, const QualityParameters& parameters = {},
                const DisparityRange& range = RANGE) {
   cv::Mat refined;
-  QualityRefinement().refine(frame.disparity, frame.labels, frame.gray, range, parameters, refined);
+  QualityRefinement().refine(frame.disparity, frame.labels, frame.gray, range, FIT, parameters, refined);
   return refined;
 }
 
@@ -231,11 +232,11 @@ TEST(QualityRefinement, keepsADepthStep) {
 
 TEST(QualityRefinement, writesTheFittedPlanesWithoutItsSteps) {
   const Frame frame = randomFrame({97, 61}, 3);
-  QualityParameters parameters = nothingButPlanes();
-  parameters.fit.max_divergence = 1.5;
+  PlaneRefinementParameters fit;
+  fit.max_divergence = 1.5;
   QualityRefinement refinement;
   cv::Mat refined;
-  refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, parameters, refined);
+  refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, fit, nothingButPlanes(), refined);
   int from_planes = 0, measured = 0, invalid = 0;
   for (int y = 0; y < 61; ++y) {
     for (int x = 0; x < 97; ++x) {
@@ -261,7 +262,7 @@ TEST(QualityRefinement, givesPlanesToSegmentsWithoutAnyByTheSelection) {
   QualityRefinement refinement;
   cv::Mat refined;
   const auto known = [&](const QualityParameters& parameters) {
-    refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, parameters, refined);
+    refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, FIT, parameters, refined);
     return std::count_if(refinement.planes().begin(), refinement.planes().end(),
                          [](const DisparityPlane& plane) { return plane.is_known; });
   };
@@ -288,7 +289,7 @@ TEST(QualityRefinement, movesPlanesByTheSmoothingOnlyWhereItSweeps) {
   QualityRefinement refinement;
   cv::Mat refined;
   const auto largestStep = [&](const QualityParameters& parameters) {
-    refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, parameters, refined);
+    refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, FIT, parameters, refined);
     const auto& planes = refinement.planes();
     return std::max(std::abs(planes[0].at(19.5, 0) - planes[1].at(19.5, 0)),
                     std::abs(planes[0].at(19.5, 29) - planes[1].at(19.5, 29)));
@@ -311,7 +312,7 @@ TEST(QualityRefinement, labelsPixelsAsPixelLabelingDoes) {
   parameters.labeling.soft_reach = 2.0;
   QualityRefinement refinement;
   cv::Mat refined;
-  refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, parameters, refined);
+  refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, FIT, parameters, refined);
 
   cv::Mat measured, expected(frame.labels.size(), CV_32FC1);
   copyValid(frame.disparity, RANGE, measured);
@@ -407,7 +408,7 @@ TEST(QualityRefinement, keepsThePixelsOfNegativeLabels) {
   QualityRefinement refinement;
   cv::Mat refined, expected;
   copyValid(frame.disparity, RANGE, expected);
-  refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, parameters, refined);
+  refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, FIT, parameters, refined);
   expectSameBits(refined, expected);
   EXPECT_TRUE(refinement.planes().empty());
 }
@@ -418,7 +419,7 @@ TEST(QualityRefinement, leavesAMapWithoutAnyDisparity) {
     frame.disparity.setTo(nothing);
     QualityRefinement refinement;
     cv::Mat refined;
-    refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, {}, refined);
+    refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, FIT, {}, refined);
     EXPECT_EQ(cv::countNonZero(refined == HOLE), 40 * 30);
     for (const DisparityPlane& plane : refinement.planes()) EXPECT_FALSE(plane.is_known);
   }
@@ -489,10 +490,13 @@ TEST(QualityRefinement, takesImagesOfEverySize) {
         frame.disparity.setTo(20.0F);
         frame.disparity.at<float>(size.height - 1, size.width - 1) = HOLE;
         QualityParameters parameters;
-        parameters.fit.min_valid_points = 3;
         parameters.medians = medians;
         parameters.label_pixels = label_pixels;
-        const cv::Mat refined = refine(frame, parameters);
+        PlaneRefinementParameters fit;
+        fit.min_valid_points = 3;
+        cv::Mat refined;
+        QualityRefinement().refine(frame.disparity, frame.labels, frame.gray, RANGE, fit, parameters,
+                                   refined);
         ASSERT_EQ(refined.size(), size);
         for (int y = 0; y < size.height; ++y) {
           for (int x = 0; x < size.width; ++x) {
@@ -525,7 +529,7 @@ TEST(QualityRefinement, takesPartsOfLargerImages) {
     frame.disparity.copyTo(part_disparity);
     frame.labels.copyTo(part_labels);
     frame.gray.copyTo(part_gray);
-    QualityRefinement().refine(part_disparity, part_labels, part_gray, RANGE, parameters, part_refined);
+    QualityRefinement().refine(part_disparity, part_labels, part_gray, RANGE, FIT, parameters, part_refined);
     expectSameBits(part_refined, expected);
     EXPECT_EQ(part_refined.data, refined.ptr(23) + 39 * sizeof(float));
     EXPECT_EQ(cv::countNonZero(refined != 55.0F), cv::countNonZero(part_refined != 55.0F));
@@ -541,9 +545,9 @@ TEST(QualityRefinement, writesIntoAnOutputOfTheRightTypeAndSize) {
     cv::Mat refined(frame.labels.size(), CV_32FC1), other(2, 2, CV_8UC1);
     const uchar* const data = refined.data;
     QualityRefinement refinement;
-    refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, parameters, refined);
+    refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, FIT, parameters, refined);
     EXPECT_EQ(refined.data, data);
-    refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, parameters, other);
+    refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, FIT, parameters, other);
     expectSameBits(other, refined);
   }
   expectSameBits(frame.disparity, disparity);
@@ -582,8 +586,8 @@ TEST(QualityRefinement, isTheSameInAUsedObject) {
       parameters.medians = seed % 4;
       QualityRefinement fresh;
       cv::Mat from_fresh;
-      used.refine(frame.disparity, frame.labels, frame.gray, RANGE, parameters, from_used);
-      fresh.refine(frame.disparity, frame.labels, frame.gray, RANGE, parameters, from_fresh);
+      used.refine(frame.disparity, frame.labels, frame.gray, RANGE, FIT, parameters, from_used);
+      fresh.refine(frame.disparity, frame.labels, frame.gray, RANGE, FIT, parameters, from_fresh);
       expectSameBits(from_used, from_fresh);
       ASSERT_EQ(used.planes().size(), fresh.planes().size());
       for (std::size_t i = 0; i < used.planes().size(); ++i) {
@@ -600,7 +604,7 @@ TEST(QualityRefinement, refusesBadImages) {
   const Frame frame = randomFrame({6, 4}, 30);
   cv::Mat refined;
   const auto refine = [&](const cv::Mat& d, const cv::Mat& l, const cv::Mat& g) {
-    return [&refined, d, l, g] { QualityRefinement().refine(d, l, g, RANGE, {}, refined); };
+    return [&refined, d, l, g] { QualityRefinement().refine(d, l, g, RANGE, FIT, {}, refined); };
   };
   const cv::Mat &d = frame.disparity, &l = frame.labels, &g = frame.gray;
   expectMessage(refine(cv::Mat(), l, g), "disparity is CV_8UC1 of 0x0, expected CV_32FC1 of 0x0, not empty");
@@ -623,14 +627,15 @@ TEST(QualityRefinement, refusesAnOutputThatSharesMemoryWithAnInput) {
   const cv::Mat disparity = frame.disparity.clone(), labels = frame.labels.clone(), gray = frame.gray.clone();
   QualityRefinement refinement;
   for (cv::Mat* shared : {&frame.disparity, &frame.labels, &frame.gray}) {
-    expectMessage([&] { refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, {}, *shared); },
-                  "refined is the memory of an input, expected an image of its own");
+    expectMessage(
+        [&] { refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, FIT, {}, *shared); },
+        "refined is the memory of an input, expected an image of its own");
   }
   cv::Mat large(9, 6, CV_32FC1, cv::Scalar(20));
   cv::Mat upper = large.rowRange(0, 4), lower = large.rowRange(3, 7), below = large.rowRange(4, 8);
-  expectMessage([&] { refinement.refine(upper, frame.labels, frame.gray, RANGE, {}, lower); },
+  expectMessage([&] { refinement.refine(upper, frame.labels, frame.gray, RANGE, FIT, {}, lower); },
                 "refined is the memory of an input");
-  EXPECT_NO_THROW(refinement.refine(upper, frame.labels, frame.gray, RANGE, {}, below));
+  EXPECT_NO_THROW(refinement.refine(upper, frame.labels, frame.gray, RANGE, FIT, {}, below));
   expectSameBits(frame.disparity, disparity);
   expectSameBits(frame.labels, labels);
   expectSameBits(frame.gray, gray);
@@ -660,7 +665,8 @@ TEST(QualityRefinement, validatesEveryParameter) {
     expectMessage([&] { validate(parameters); }, message);
     expectMessage(
         [&] {
-          QualityRefinement().refine(frame.disparity, frame.labels, frame.gray, RANGE, parameters, refined);
+          QualityRefinement().refine(frame.disparity, frame.labels, frame.gray, RANGE, FIT, parameters,
+                                     refined);
         },
         message);
     expectSameBits(refined, untouched);
@@ -673,8 +679,12 @@ TEST(QualityRefinement, validatesEveryParameter) {
   };
   const double nan = NOT_A_NUMBER, inf = INFINITE;
 
-  expectRefused("inlier_threshold is 0,", [](P& p) { p.fit.inlier_threshold = 0.0; });
-  expectRefused("max_divergence is -1,", [](P& p) { p.fit.max_divergence = -1.0; });
+  PlaneRefinementParameters fit;
+  fit.inlier_threshold = 0.0;
+  expectMessage(
+      [&] { QualityRefinement().refine(frame.disparity, frame.labels, frame.gray, RANGE, fit, {}, refined); },
+      "inlier_threshold is 0,");
+  expectSameBits(refined, untouched);
   expectRefused("selection.sweeps is -1, expected at least 0", [](P& p) { p.selection.sweeps = -1; });
   expectRefused("smoothing.sweeps is -1, expected at least 0", [](P& p) { p.smoothing.sweeps = -1; });
   expectRefused("medians is -1, expected at least 0", [](P& p) { p.medians = -1; });

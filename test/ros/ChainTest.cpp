@@ -11,6 +11,7 @@
 #include "CoreChain.hpp"
 #include "DisparityContract.hpp"
 #include "disparity_refinement/Planes.h"
+#include "disparity_refinement/refinement/Confidence.hpp"
 
 namespace disparity_refinement {
 namespace {
@@ -18,13 +19,18 @@ namespace {
 using sensor_msgs::Image;
 using stereo_msgs::DisparityImage;
 
-/// The parameters of chain.test.
+/// The parameters of chain.test, or of quality_chain.test.
 CoreParameters testParameters() {
   CoreParameters parameters;
   parameters.matching.disparity_range = 64;
   parameters.segmentation.lambda = 20;
   parameters.segmentation.h = 3;
-  parameters.refinement.min_valid_fraction = 0.3;
+  parameters.refinement.planes.min_valid_fraction = 0.3;
+  if (ros::param::param("~quality", false)) {
+    parameters.matching.stereo_algorithm = StereoAlgorithm::CENSUS_SGM;
+    parameters.matching.full_width = true;
+    parameters.refinement.mode = RefinementMode::QUALITY;
+  }
   return parameters;
 }
 
@@ -193,6 +199,28 @@ TEST_F(Chain, publishesThePlanesOfTheCore) {
     accepted += message->planes[i].status == Plane::ACCEPTED ? 1 : 0;
   }
   EXPECT_GT(accepted, 0);
+}
+
+TEST_F(Chain, publishesSourceAndConfidenceOfTheCore) {
+  Listener<Image> source(nh_, "disparity_source"), confidence(nh_, "confidence");
+  ASSERT_TRUE(camera_.waitForChain(source) && camera_.waitForChain(confidence));
+  const StereoMessages messages = camera_.make(0);
+  camera_.publish(messages);
+  const auto source_message = source.wait(camera_.stamp(0));
+  const auto confidence_message = confidence.wait(camera_.stamp(0));
+  ASSERT_TRUE(source_message && confidence_message);
+  EXPECT_EQ(source_message->header.frame_id, "stereo_left");
+  EXPECT_EQ(confidence_message->header.frame_id, "stereo_left");
+  const CoreResult core = runCore(messages, testParameters());
+  cv::Mat sources, expected;
+  findSources(core.disparity, core.refined, core.labels, core.range, core.fitted_planes, sources);
+  findConfidence(sources, expected);
+  EXPECT_TRUE(sameBits(imageView(*source_message, "mono8", "disparity_source"), sources));
+  EXPECT_TRUE(sameBits(imageView(*confidence_message, "mono8", "confidence"), expected));
+  double low = 0.0, high = 0.0;
+  cv::minMaxLoc(expected, &low, &high);
+  EXPECT_LT(low, 50.0);
+  EXPECT_GT(high, 200.0);
 }
 
 TEST_F(Chain, publishesDepthInMetres) {

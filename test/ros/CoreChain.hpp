@@ -6,7 +6,7 @@
 
 #include "ChainClient.hpp"
 #include "disparity_refinement/matching/StereoMatcher.hpp"
-#include "disparity_refinement/refinement/PlaneRefinement.hpp"
+#include "disparity_refinement/refinement/DisparityRefinement.hpp"
 #include "disparity_refinement/segmentation/Segmentation.hpp"
 
 /// What the chain has to give: the same pair through the core.
@@ -15,14 +15,14 @@ namespace disparity_refinement {
 struct CoreParameters {
   MatchingParameters matching;
   SegmentationParameters segmentation;
-  PlaneRefinementParameters refinement;
+  RefinementParameters refinement;
 };
 
 struct CoreResult {
   DisparityRange range;
   cv::Mat disparity, labels, refined;
   int segments = 0;
-  std::vector<SegmentPlane> planes;
+  std::vector<SegmentPlane> planes, fitted_planes;
 };
 
 /// For a pair of mono8 images.
@@ -36,12 +36,13 @@ inline CoreResult runCore(const StereoMessages& messages, const CoreParameters& 
   result.range = matcher.range();
   Segmentation segmentation;
   result.segments = segmentation.compute(left, parameters.segmentation, result.labels);
-  PlaneRefinement refinement;
+  DisparityRefinement refinement;
   const double f_times_t = static_cast<double>(static_cast<float>(messages.left_info->P[0])) *
                            static_cast<float>(-messages.right_info->P[3] / messages.left_info->P[0]);
-  refinement.refine(result.disparity, result.labels, result.range, f_times_t, parameters.refinement,
+  refinement.refine(result.disparity, result.labels, left, result.range, f_times_t, parameters.refinement,
                     result.refined);
   result.planes = refinement.planes();
+  result.fitted_planes = refinement.fittedPlanes();
   return result;
 }
 

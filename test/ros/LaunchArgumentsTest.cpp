@@ -85,20 +85,23 @@ class Chain {
   Listener<Image> labels{nh, "labels"};
 };
 
-/// Those of most chains of launch_arguments.test.
+/// Those of most chains of launch_arguments.test: what the launch file does unless it is told.
 CoreParameters defaultParameters() {
   CoreParameters parameters;
   parameters.matching.disparity_range = 64;
+  parameters.matching.full_width = true;
+  parameters.refinement.mode = RefinementMode::QUALITY;
   return parameters;
 }
 
 /// Those of the chain "from_file".
 CoreParameters fileParameters() {
   CoreParameters parameters;
+  parameters.matching.stereo_algorithm = StereoAlgorithm::BM;
   parameters.matching.disparity_range = 64;
   parameters.segmentation.lambda = 20;
   parameters.segmentation.h = 2;
-  parameters.refinement.max_divergence = 0.25;
+  parameters.refinement.planes.max_divergence = 0.25;
   return parameters;
 }
 
@@ -117,11 +120,17 @@ TEST(ParameterFile, isInForceUnlessAnArgumentSaysOtherwise) {
   other.segmentation.lambda = 20;
   EXPECT_FALSE(sameBits(runCore(pair, other).labels, expected.labels)) << "default h";
   other = fileParameters();
-  other.refinement = PlaneRefinementParameters();
+  other.refinement = RefinementParameters();
   EXPECT_FALSE(sameBits(runCore(pair, other).refined, expected.refined)) << "default max_divergence";
   other = fileParameters();
-  other.matching = MatchingParameters();
+  other.matching.disparity_range = MatchingParameters().disparity_range;
   EXPECT_FALSE(sameBits(runCore(pair, other).disparity, expected.disparity)) << "default disparity_range";
+  other = fileParameters();
+  other.matching.full_width = true;
+  EXPECT_FALSE(sameBits(runCore(pair, other).disparity, expected.disparity)) << "full_width of the mode";
+  other = fileParameters();
+  other.matching.stereo_algorithm = StereoAlgorithm::CENSUS_SGM;
+  EXPECT_FALSE(sameBits(runCore(pair, other).disparity, expected.disparity)) << "matcher of the file";
 }
 
 bool unload(const std::string& manager, const std::string& name) {
@@ -161,6 +170,7 @@ TEST(RefusedStartValue, isReplacedAndReported) {
   const struct {
     std::string name, asked, in_force;
   } REFUSED[] = {
+      {"disparity/stereo_algorithm", "telepathy", "1"},
       {"disparity/correlation_window_size", "8", "9"},
       {"segmentation/lambda", "-7", "0"},
       {"segmentation/h", "deep", "5"},
@@ -168,6 +178,7 @@ TEST(RefusedStartValue, isReplacedAndReported) {
       {"segmentation/segmentation_threads", "100", "64"},
       {"segmentation/shadow_threshold", "999", "255"},
       {"segmentation/shadow_gamma", "0.001", "0.05"},
+      {"plane_refinement/refinement_mode", "brilliant", "0"},
       {"plane_refinement/max_divergence", "-1.5", "0"},
       {"plane_refinement/min_valid_fraction", "{0.5}", "0.1"},
   };
@@ -187,7 +198,8 @@ TEST(RefusedStartValue, isReplacedAndReported) {
   in_force.segmentation.lambda = 0;
   in_force.segmentation.gradient.shadow_threshold = 255;
   in_force.segmentation.gradient.shadow_gamma = 0.05;
-  in_force.refinement.max_divergence = 0.0;
+  in_force.refinement.mode = RefinementMode::PAPER;
+  in_force.refinement.planes.max_divergence = 0.0;
   chain.expectCore(in_force);
   EXPECT_FALSE(log.waitFor({"/refused/disparity/disparity_range is"}, Log::WARN, 0.0)) << "a good value";
 }

@@ -47,7 +47,9 @@ TEST(LiveParameters, segmentationDefaultsAreThoseOfTheCore) {
 
 TEST(LiveParameters, refinementDefaultsAreThoseOfTheCore) {
   const PlaneRefinementParameters core;
-  const PlaneRefinementParameters live = defaultParameters<PlaneRefinementConfig>();
+  const RefinementParameters refinement = defaultParameters<PlaneRefinementConfig>();
+  EXPECT_EQ(refinement.mode, RefinementParameters().mode);
+  const PlaneRefinementParameters& live = refinement.planes;
   EXPECT_EQ(live.inlier_threshold, core.inlier_threshold);
   EXPECT_EQ(live.confidence, core.confidence);
   EXPECT_EQ(live.max_slope_x, core.max_slope_x);

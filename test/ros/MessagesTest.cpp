@@ -336,6 +336,7 @@ TEST(PlanesMessage, hasTheStatusOfTheCore) {
   EXPECT_EQ(static_cast<int>(PlaneStatus::TOO_FEW_POINTS), Plane::TOO_FEW_POINTS);
   EXPECT_EQ(static_cast<int>(PlaneStatus::DEGENERATE), Plane::DEGENERATE);
   EXPECT_EQ(static_cast<int>(PlaneStatus::MAX_ITERATIONS), Plane::MAX_ITERATIONS);
+  EXPECT_EQ(static_cast<int>(PlaneStatus::OF_NEIGHBOUR), Plane::OF_NEIGHBOUR);
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ TEST(StageParameters, startsWithTheDefaultsOfTheCore) {
   const StageParameters parameters;
   EXPECT_EQ(parameters.matching().correlation_window_size, MatchingParameters().correlation_window_size);
   EXPECT_EQ(parameters.segmentation().lambda, SegmentationParameters().lambda);
-  EXPECT_EQ(parameters.refinement().max_divergence, PlaneRefinementParameters().max_divergence);
+  EXPECT_EQ(parameters.refinement().planes.max_divergence, PlaneRefinementParameters().max_divergence);
 }
 
 TEST(StageParameters, setsEachTypeByItsName) {
@@ -27,7 +27,7 @@ TEST(StageParameters, setsEachTypeByItsName) {
   EXPECT_TRUE(parameters.matching().full_width);
   EXPECT_EQ(parameters.matching().min_disparity, -16);
   EXPECT_EQ(parameters.segmentation().h, 7);
-  EXPECT_EQ(parameters.refinement().inlier_threshold, 2.0);
+  EXPECT_EQ(parameters.refinement().planes.inlier_threshold, 2.0);
   EXPECT_EQ(parameters.segmentation().gradient.shadow_gamma, 0.5);
   EXPECT_EQ(std::get<int>(parameters.values().at("h")), 7);
   EXPECT_EQ(parameters.values().size(),
@@ -111,7 +111,7 @@ TEST(StageParameters, readsTheFileOfTheLaunchFiles) {
   EXPECT_EQ(parameters.matching().sgbm_mode, SgbmMode::HH);
   EXPECT_EQ(parameters.segmentation().lambda, 80);
   EXPECT_FALSE(parameters.segmentation().gradient.shadow_enhancement);
-  EXPECT_EQ(parameters.refinement().max_divergence, 5.0);
+  EXPECT_EQ(parameters.refinement().planes.max_divergence, 5.0);
 }
 
 TEST(StageParameters, namesTheFileThatItCannotRead) {
@@ -147,7 +147,7 @@ TEST(StageParameters, optionsWinOverTheFile) {
   EXPECT_EQ(parameters.segmentation().lambda, 80);
   EXPECT_EQ(parameters.segmentation().h, 3);
   EXPECT_EQ(parameters.matching().min_disparity, -16);
-  EXPECT_EQ(parameters.refinement().max_slope_x, 0.5);
+  EXPECT_EQ(parameters.refinement().planes.max_slope_x, 0.5);
 }
 
 TEST(StageParameters, tellsWhichStageDiffers) {

@@ -191,7 +191,7 @@ TEST_F(Tools, evaluateExplainsWhatItCannotDo) {
   expectError("evaluate " + training + " --variant h=1 --maps x", "--variant and --maps exclude each other");
   expectError("evaluate " + training + " --lambda 1 --maps x", "--lambda and --maps exclude each other");
   expectError("evaluate " + training + " --name x", "--name is for --maps");
-  expectError("evaluate " + training + " --mode best", "mode is best, expected paper or quality");
+  expectError("evaluate " + training + " --mode best", "mode is best, expected paper, fast or quality");
   expectError("evaluate " + training + " --ablation", "--ablation is for --mode quality");
   expectError("evaluate " + training + " --mode quality --ablation --variant h=1 --variant h=2",
               "--ablation is for one variant");
@@ -252,7 +252,7 @@ TEST_F(Tools, refineWritesMapAndColoursByDefault) {
   fs::current_path(out(""));
   expectGood("refine " + pair());
   expectGood("refine " + pair() + " --mode quality -o " + out("quality.png"));
-  expectError("refine " + pair() + " --mode best", "mode is best, expected paper or quality");
+  expectError("refine " + pair() + " --mode best", "mode is best, expected paper, fast or quality");
   fs::current_path(before);
   EXPECT_TRUE(fs::exists(out("disparity_refined.png")));
   EXPECT_TRUE(fs::exists(out("disparity_refined_color.png")));

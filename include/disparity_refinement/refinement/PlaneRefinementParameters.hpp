@@ -53,13 +53,14 @@ enum class PlaneStatus {
   TOO_FEW_POINTS = 1,  ///< Condition 2 fails.
   DEGENERATE = 2,      ///< No trial gave a plane within the slopes: the points lie on a line, say.
   MAX_ITERATIONS = 3,  ///< Condition 3 fails.
+  OF_NEIGHBOUR = 4,    ///< One of these, but a neighbour's plane is used: RefinementMode::QUALITY.
 };
 
 const char* toString(PlaneStatus status);
 
 /// The plane d = a x + (b y + c) of a segment; x, y in pixels of the image, d in px.
 struct SegmentPlane {
-  double a = 0.0, b = 0.0, c = 0.0;  ///< 0 unless ACCEPTED.
+  double a = 0.0, b = 0.0, c = 0.0;  ///< 0 unless ACCEPTED or OF_NEIGHBOUR.
   int pixels = 0;                    ///< Pixels of the segment; 0 if no pixel has this label.
   int valid = 0;                     ///< Pixels with a disparity: the support.
   int inliers = 0;                   ///< Those of them to which the plane was fitted; 0 unless ACCEPTED.

@@ -15,15 +15,12 @@ namespace disparity_refinement {
 
 /// Parameters of QualityRefinement. Every step can be left out: selection and smoothing by 0 sweeps.
 struct QualityParameters {
-  /// What concerns the fit: inlier_threshold ... max_slope_y, min_valid_fraction, min_valid_points and
-  /// max_iterations. The conditions 1 and 4 of the paper have no part here.
-  PlaneRefinementParameters fit;
   /// Difference of gray values at which a border between segments counts half, > 0.
   double half_contrast = 10.0;
   PlaneSelectionParameters selection;
   PlaneSmoothingParameters smoothing;
   /// Whether pixels choose among candidates; otherwise a pixel takes its segment's plane, unless a measured
-  /// disparity differs from it by more than fit.max_divergence.
+  /// disparity differs from it by more than the max_divergence of the fit.
   bool label_pixels = true;
   PixelLabelingParameters labeling;
   /// Times that the result is filtered by the median of 5 x 5 pixels, >= 0.
@@ -45,6 +42,9 @@ class QualityRefinement {
   /// @param labels     CV_32SC1 of the same size, 0 ... n - 1; a pixel with a negative label keeps its
   ///                   disparity.
   /// @param gray       CV_8UC1 of the same size: the left image.
+  /// @param fit        What concerns the fit: inlier_threshold ... max_slope_y, min_valid_fraction,
+  ///                   min_valid_points and max_iterations. The conditions 1 and 4 of the paper have no part
+  ///                   here.
   /// @param refined    CV_32FC1 of the same size; written in place if it has that type and size already. At
   ///                   least one pixel is range.invalid(); otherwise only pixels without any plane around
   ///                   are.
@@ -52,10 +52,13 @@ class QualityRefinement {
   ///                   least the number of pixels, a `refined` that shares memory with an input, and bad
   ///                   parameters; `refined` is not touched then.
   void refine(const cv::Mat& disparity, const cv::Mat& labels, const cv::Mat& gray,
-              const DisparityRange& range, const QualityParameters& parameters, cv::Mat& refined);
+              const DisparityRange& range, const PlaneRefinementParameters& fit,
+              const QualityParameters& parameters, cv::Mat& refined);
 
   /// Plane of every label of the last refine(): is_known is false where none could be found.
   const std::vector<DisparityPlane>& planes() const { return planes_; }
+  /// The planes that were fitted to the segments, before any of them was exchanged or moved.
+  const std::vector<SegmentPlane>& fittedPlanes() const { return fitting_.planes(); }
 
  private:
   void takePlanes(const DisparityRange& range, double max_divergence, cv::Mat& refined) const;

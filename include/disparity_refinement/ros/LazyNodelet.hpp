@@ -31,7 +31,11 @@ class LazyNodelet : public nodelet::Nodelet {
   /// Begins the destructor of a derived class: updateSubscriptions() is not called any more.
   void stop();
 
-  /// Subscribe to what isWanted() and shut down the rest. Called whenever a listener comes or goes.
+  /// Calls updateSubscriptions() between start() and stop(). An exception is logged.
+  void update();
+
+  /// Subscribe to what isWanted() and shut down the rest. Called whenever a listener comes or goes, and by
+  /// update().
   virtual void updateSubscriptions() = 0;
 
   template <class Publisher>
@@ -48,7 +52,6 @@ class LazyNodelet : public nodelet::Nodelet {
 
  private:
   static constexpr int PUBLISHER_QUEUE_SIZE = 10;
-  void update();
 
   std::mutex mutex_;
   bool started_ = false;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -16,7 +17,7 @@
 #include "disparity_refinement/SegmentationConfig.h"
 #include "disparity_refinement/VisualizationConfig.h"
 #include "disparity_refinement/matching/StereoMatcher.hpp"
-#include "disparity_refinement/refinement/PlaneRefinement.hpp"
+#include "disparity_refinement/refinement/DisparityRefinement.hpp"
 #include "disparity_refinement/segmentation/Segmentation.hpp"
 
 namespace disparity_refinement {
@@ -25,7 +26,7 @@ namespace disparity_refinement {
 /// window) is replaced in the configuration too, so that the user sees what is in force.
 MatchingParameters toParameters(DisparityConfig& config);
 SegmentationParameters toParameters(SegmentationConfig& config);
-PlaneRefinementParameters toParameters(PlaneRefinementConfig& config);
+RefinementParameters toParameters(PlaneRefinementConfig& config);
 VisualizationConfig toParameters(VisualizationConfig& config);
 
 /// NaN passes every clamp: it becomes the default value.
@@ -51,7 +52,10 @@ class LiveParameters {
  public:
   using Parameters = decltype(toParameters(std::declval<Config&>()));
 
-  explicit LiveParameters(const ros::NodeHandle& private_nh) {
+  /// @param changed  Called after every change, by the thread of `private_nh`'s callbacks.
+  explicit LiveParameters(
+      const ros::NodeHandle& private_nh, std::function<void()> changed = [] {})
+      : changed_(std::move(changed)) {
     Config start = Config::__getDefault__();
     start.__fromServer__(private_nh);
     start.__clamp__();
@@ -64,9 +68,12 @@ class LiveParameters {
     server_.reset(new dynamic_reconfigure::Server<Config>(server_mutex_, private_nh));
     // Calls back at once.
     server_->setCallback([this](Config& config, std::uint32_t) {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      replaceNan(config);
-      parameters_ = toParameters(config);
+      {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        replaceNan(config);
+        parameters_ = toParameters(config);
+      }
+      changed_();
     });
   }
 
@@ -76,6 +83,7 @@ class LiveParameters {
   }
 
  private:
+  const std::function<void()> changed_;
   mutable std::mutex mutex_;
   Parameters parameters_;
   boost::recursive_mutex server_mutex_;

@@ -1,0 +1,69 @@
+#include "disparity_refinement/refinement/Confidence.hpp"
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "disparity_refinement/arguments.hpp"
+
+namespace disparity_refinement {
+namespace {
+
+DisparitySource sourceOf(float disparity, float refined, int x, int y, const SegmentPlane* fitted,
+                         const DisparityRange& range) {
+  if (!range.isValid(refined)) return DisparitySource::NONE;
+  if (range.isValid(disparity) && std::abs(disparity - refined) <= SAME_SOURCE) {
+    return DisparitySource::MEASURED;
+  }
+  if (fitted == nullptr || fitted->status != PlaneStatus::ACCEPTED) return DisparitySource::FILLED;
+  const double on_plane = fitted->a * x + fitted->b * y + fitted->c;
+  return std::abs(on_plane - refined) <= SAME_SOURCE ? DisparitySource::OWN_PLANE
+                                                     : DisparitySource::NEIGHBOUR_PLANE;
+}
+
+}  // namespace
+
+const char* toString(DisparitySource source) {
+  switch (source) {
+    case DisparitySource::NONE:
+      return "none";
+    case DisparitySource::MEASURED:
+      return "measured";
+    case DisparitySource::OWN_PLANE:
+      return "own plane";
+    case DisparitySource::NEIGHBOUR_PLANE:
+      return "neighbour's plane";
+    case DisparitySource::FILLED:
+      return "filled";
+  }
+  return "unknown";
+}
+
+void findSources(const cv::Mat& disparity, const cv::Mat& refined, const cv::Mat& labels,
+                 const DisparityRange& range, const std::vector<SegmentPlane>& fitted, cv::Mat& sources) {
+  requireImage(disparity, "disparity", CV_32FC1);
+  requireImage(refined, "refined", CV_32FC1, disparity.size());
+  requireImage(labels, "labels", CV_32SC1, disparity.size());
+  double largest = 0.0;
+  cv::minMaxLoc(labels, nullptr, &largest);
+  requireArgument(largest < static_cast<double>(fitted.size()), "the largest label", largest,
+                  "less than the number of planes, " + std::to_string(fitted.size()));
+  sources.create(disparity.size(), CV_8UC1);
+  for (int y = 0; y < disparity.rows; ++y) {
+    const auto *d = disparity.ptr<float>(y), *r = refined.ptr<float>(y);
+    const int* label = labels.ptr<int>(y);
+    auto* source = sources.ptr<std::uint8_t>(y);
+    for (int x = 0; x < disparity.cols; ++x) {
+      const SegmentPlane* plane = label[x] < 0 ? nullptr : &fitted[label[x]];
+      source[x] = static_cast<std::uint8_t>(sourceOf(d[x], r[x], x, y, plane, range));
+    }
+  }
+}
+
+void findConfidence(const cv::Mat& sources, cv::Mat& confidence) {
+  requireImage(sources, "sources", CV_8UC1);
+  const cv::Mat is_measured = sources == static_cast<int>(DisparitySource::MEASURED);
+  cv::blur(is_measured, confidence, {CONFIDENCE_WINDOW, CONFIDENCE_WINDOW}, {-1, -1}, cv::BORDER_REPLICATE);
+  confidence.setTo(0, sources == static_cast<int>(DisparitySource::NONE));
+}
+
+}  // namespace disparity_refinement

@@ -1,0 +1,36 @@
+#include "disparity_refinement/refinement/DisparityRefinement.hpp"
+
+namespace disparity_refinement {
+
+void validate(const RefinementParameters& parameters) {
+  validate(parameters.planes);
+  validate(parameters.quality);
+}
+
+void DisparityRefinement::refine(const cv::Mat& disparity, const cv::Mat& labels, const cv::Mat& gray,
+                                 const DisparityRange& range, double focal_length_times_baseline,
+                                 const RefinementParameters& parameters, cv::Mat& refined) {
+  if (parameters.mode == RefinementMode::PAPER) {
+    paper_.refine(disparity, labels, range, focal_length_times_baseline, parameters.planes, refined);
+  } else {
+    quality_.refine(disparity, labels, gray, range, parameters.planes, parameters.quality, refined);
+  }
+  mode_ = parameters.mode;
+}
+
+std::vector<SegmentPlane> DisparityRefinement::planes() const {
+  std::vector<SegmentPlane> planes = fittedPlanes();
+  if (mode_ == RefinementMode::PAPER) return planes;
+  for (std::size_t label = 0; label < planes.size(); ++label) {
+    const DisparityPlane& used = quality_.planes()[label];
+    if (!used.is_known) continue;
+    SegmentPlane& plane = planes[label];
+    plane.a = used.a;
+    plane.b = used.b;
+    plane.c = used.c;
+    if (plane.status != PlaneStatus::ACCEPTED) plane.status = PlaneStatus::OF_NEIGHBOUR;
+  }
+  return planes;
+}
+
+}  // namespace disparity_refinement
