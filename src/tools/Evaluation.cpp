@@ -4,6 +4,8 @@
 #include <atomic>
 #include <cctype>
 #include <chrono>
+#include <cmath>
+#include <cstdint>
 #include <exception>
 #include <filesystem>
 #include <mutex>
@@ -140,6 +142,11 @@ class FrameEvaluator {
                          refinement_parameters, refined);
     });
     map_ = roundToKittiPng(refined, range);
+    if (options_.confidence) {
+      findSources(disparity_, refined, labels_, range, refinement_.fittedPlanes(), sources_);
+      findConfidence(sources_, confidence_);
+      figures.confidence.add(refined, sources_, confidence_, frame.ground_truth.begin()->second);
+    }
     if (options_.pictures.empty()) return;
 
     RefinementPicture picture;
@@ -168,7 +175,7 @@ class FrameEvaluator {
   DisparityRefinement refinement_;
   /// Parameters of what disparity_ and labels_ hold for this frame; null: nothing yet.
   const StageParameters *matched_ = nullptr, *segmented_ = nullptr;
-  cv::Mat disparity_, labels_, map_;
+  cv::Mat disparity_, labels_, map_, sources_, confidence_;
   int segments_ = 0;
   double matching_ms_ = 0.0, segmentation_ms_ = 0.0;
 };
@@ -217,6 +224,34 @@ class OpenCvThreads {
 
 }  // namespace
 
+void ConfidenceFigures::add(const cv::Mat& refined, const cv::Mat& sources, const cv::Mat& confidence,
+                            const cv::Mat& truth) {
+  for (int y = 0; y < truth.rows; ++y) {
+    for (int x = 0; x < truth.cols; ++x) {
+      const int source = sources.at<std::uint8_t>(y, x);
+      const float expected = truth.at<float>(y, x);
+      if (expected <= 0.0F || source == static_cast<int>(DisparitySource::NONE)) continue;
+      const bool is_wrong = std::abs(refined.at<float>(y, x) - expected) > WRONG;
+      for (Count* count :
+           {&by_source.at(source), &by_confidence[confidence.at<std::uint8_t>(y, x) * BINS / 256]}) {
+        ++count->pixels;
+        count->wrong += is_wrong ? 1 : 0;
+      }
+    }
+  }
+}
+
+void ConfidenceFigures::add(const ConfidenceFigures& other) {
+  const auto addAll = [](auto& sums, const auto& counts) {
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      sums[i].pixels += counts[i].pixels;
+      sums[i].wrong += counts[i].wrong;
+    }
+  };
+  addAll(by_source, other.by_source);
+  addAll(by_confidence, other.by_confidence);
+}
+
 EvaluationFigures Evaluation::mean(std::size_t method) const {
   EvaluationFigures mean;
   std::map<std::string, KittiScoreMean> scores;
@@ -227,6 +262,7 @@ EvaluationFigures Evaluation::mean(std::size_t method) const {
     mean.ms.matching += weight * frame.ms.matching;
     mean.ms.segmentation += weight * frame.ms.segmentation;
     mean.ms.refinement += weight * frame.ms.refinement;
+    mean.confidence.add(frame.confidence);
   }
   for (const auto& [kind, sum] : scores) mean.scores[kind] = sum.mean();
   return mean;

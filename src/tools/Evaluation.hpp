@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
 #include <string>
@@ -8,6 +9,7 @@
 #include "StageParameters.hpp"
 #include "disparity_refinement/evaluation/KittiDataset.hpp"
 #include "disparity_refinement/evaluation/KittiMetric.hpp"
+#include "disparity_refinement/refinement/Confidence.hpp"
 #include "disparity_refinement/refinement/QualityRefinement.hpp"
 
 namespace disparity_refinement {
@@ -32,16 +34,34 @@ struct StageTimes {
   double total() const { return matching + segmentation + refinement; }
 };
 
+/// How many refined disparities are wrong, by what is said of them. Disparities alone: holes that are
+/// interpolated for the scores do not count.
+struct ConfidenceFigures {
+  static constexpr int BINS = 8;     ///< Of confidence, 256 / BINS levels each.
+  static constexpr float WRONG = 3;  ///< Error beyond which a disparity is wrong [px].
+
+  struct Count {
+    long pixels = 0, wrong = 0;
+  };
+  std::array<Count, DISPARITY_SOURCES> by_source;
+  std::array<Count, BINS> by_confidence;
+
+  void add(const cv::Mat& refined, const cv::Mat& sources, const cv::Mat& confidence, const cv::Mat& truth);
+  void add(const ConfidenceFigures& other);
+};
+
 /// Figures of one method on one frame, or their mean.
 struct EvaluationFigures {
   std::map<std::string, KittiScore> scores;  ///< By the kind of ground truth, "noc" and "occ".
   double segments = 0.0;                     ///< 0 without a segmentation.
   StageTimes ms;                             ///< 0 for a stage that was not run.
+  ConfidenceFigures confidence;  ///< With EvaluationOptions::confidence; of all frames in the mean.
 };
 
 struct EvaluationOptions {
   int threads = 1;          ///< Frames computed at the same time, >= 1.
   bool keep_going = false;  ///< Leave a frame that fails out instead of throwing.
+  bool confidence = false;  ///< Count errors by source and confidence of refined disparities.
   std::string write_maps;   ///< Folder for the maps of every method, METHOD/FRAME.png; empty: none.
   std::string pictures;     ///< Folder for pictures of every refined method, METHOD/FRAME.png; empty: none.
 };

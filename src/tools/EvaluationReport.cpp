@@ -41,6 +41,52 @@ Json parametersOf(const EvaluatedMethod& method) {
   return json;
 }
 
+/// (what is said of a disparity, how often it is said and wrong), in the order of the tables.
+std::vector<std::pair<std::string, ConfidenceFigures::Count>> countsOf(const ConfidenceFigures& figures) {
+  std::vector<std::pair<std::string, ConfidenceFigures::Count>> counts;
+  for (int i = static_cast<int>(DisparitySource::MEASURED); i < DISPARITY_SOURCES; ++i) {
+    counts.emplace_back(toString(static_cast<DisparitySource>(i)), figures.by_source[i]);
+  }
+  constexpr int LEVELS = 256 / ConfidenceFigures::BINS;
+  for (int i = ConfidenceFigures::BINS - 1; i >= 0; --i) {
+    counts.emplace_back(format("confidence %d-%d", i * LEVELS, (i + 1) * LEVELS - 1),
+                        figures.by_confidence[i]);
+  }
+  return counts;
+}
+
+long pixelsOf(const ConfidenceFigures& figures) {
+  long pixels = 0;
+  for (const ConfidenceFigures::Count& count : figures.by_source) pixels += count.pixels;
+  return pixels;
+}
+
+double percentage(long part, long whole) {
+  return whole > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(whole) : 0.0;
+}
+
+Json toJson(const ConfidenceFigures& figures) {
+  Json json = Json::object();
+  for (const auto& [name, count] : countsOf(figures)) {
+    json[name] = {{"share", percentage(count.pixels, pixelsOf(figures))},
+                  {"wrong", percentage(count.wrong, count.pixels)}};
+  }
+  return json;
+}
+
+void printConfidence(const std::string& method, const ConfidenceFigures& figures, std::ostream& out) {
+  const auto counts = countsOf(figures);
+  long wrong = 0;
+  for (const ConfidenceFigures::Count& count : figures.by_source) wrong += count.wrong;
+  out << "\n"
+      << method << ", disparities of all frames  share [%]  wrong by more than 3 px [%]  of all errors [%]\n";
+  for (const auto& [name, count] : counts) {
+    out << padded("  " + name, method.size() + 27)
+        << format("  %9.2f  %27.2f  %17.1f\n", percentage(count.pixels, pixelsOf(figures)),
+                  percentage(count.wrong, count.pixels), percentage(count.wrong, wrong));
+  }
+}
+
 Json toJson(const EvaluatedMethod& method, const EvaluationFigures& mean, std::size_t frames) {
   Json json;
   json["name"] = method.name;
@@ -52,6 +98,7 @@ Json toJson(const EvaluatedMethod& method, const EvaluationFigures& mean, std::s
                 {"segmentation", time(mean.ms.segmentation)},
                 {"refinement", time(mean.ms.refinement)},
                 {"total", time(mean.ms.total())}};
+  if (pixelsOf(mean.confidence) > 0) json["confidence"] = toJson(mean.confidence);
   for (const auto& [kind, score] : mean.scores) {
     json[kind] = {{"density", 100.0 * score.density}, {"all", toJson(score.all)}, {"est", toJson(score.est)}};
   }
@@ -118,6 +165,10 @@ void printTables(const Evaluation& evaluation, std::ostream& out) {
         << (method.isRefined() ? format("  %8.1f", means[m].segments) : format("  %8s", "-"))
         << format("  %13.1f  %12.1f  %10.1f  %7.1f\n", ms.matching, ms.segmentation, ms.refinement,
                   ms.total());
+  }
+  for (std::size_t m = 0; m < means.size(); ++m) {
+    if (pixelsOf(means[m].confidence) == 0) continue;
+    printConfidence(evaluation.methods[m].name, means[m].confidence, out);
   }
   if (!evaluation.left_out.empty()) {
     out << "\nLeft out, " << evaluation.left_out.size() << " frames:\n";

@@ -208,6 +208,7 @@ void refuseWithMaps(const po::variables_map& values) {
     if (values.count(name) > 0) refuse(name);
   }
   if (!values["ablation"].defaulted()) refuse("ablation");
+  if (!values["by-confidence"].defaulted()) refuse("by-confidence");
   for (const auto& parameter : StageParameters().values()) {
     if (values.count(parameter.first) > 0) refuse(parameter.first);
   }
@@ -225,6 +226,8 @@ void run(int argc, char** argv) {
       "threads", po::value(&options.threads)->default_value(options.threads),
       "frames computed at the same time; the figures do not depend on it, the times are truest with 1")(
       "ablation", po::bool_switch(&with_ablation), "with --mode quality: its steps one after the other")(
+      "by-confidence", po::bool_switch(&options.confidence),
+      "errors by where refined disparities come from and by their confidence")(
       "variant", po::value(&variants)->value_name("NAME=VALUE[,NAME=VALUE...]"),
       "refine with these parameters instead; any number of times, all in one run")(
       "maps", po::value(&maps)->value_name("DIR"), "score the maps DIR/FRAME.png (KITTI's 16-bit PNG)")(

@@ -1,9 +1,11 @@
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <limits>
 #include <optional>
 #include <set>
+#include <vector>
 
 #include "CommandLine.hpp"
 #include "OutputFiles.hpp"
@@ -11,6 +13,7 @@
 #include "StageParameters.hpp"
 #include "disparity_refinement/arguments.hpp"
 #include "disparity_refinement/evaluation/KittiFiles.hpp"
+#include "disparity_refinement/refinement/Confidence.hpp"
 #include "disparity_refinement/visualization/Colorize.hpp"
 #include "disparity_refinement/visualization/RefinementPicture.hpp"
 
@@ -37,7 +40,7 @@ struct Calibration {
 };
 
 struct Outputs {
-  std::string png, color, pfm, ply, picture;
+  std::string png, color, pfm, ply, picture, source, confidence;
   float color_max = 64.0F;  ///< Near end of the colour scale [px]
 
   /// Throws std::invalid_argument unless every name has the ending of its format and is another one.
@@ -50,16 +53,21 @@ struct Outputs {
     require_ending("output", png, ".png");
     require_ending("pfm", pfm, ".pfm");
     require_ending("ply", ply, ".ply");
+    require_ending("source-map", source, ".png");
+    require_ending("confidence-map", confidence, ".png");
     std::set<std::string> names;
-    for (const std::string& file : {png, color, pfm, ply, picture}) {
+    for (const std::string& file : all()) {
       if (!file.empty() && !names.insert(file).second) {
         throw std::invalid_argument(file + " is the name of two outputs");
       }
     }
   }
 
+  std::vector<std::string> all() const { return {png, color, pfm, ply, picture, source, confidence}; }
+
   bool any() const {
-    return !png.empty() || !color.empty() || !pfm.empty() || !ply.empty() || !picture.empty();
+    const std::vector<std::string> files = all();
+    return std::any_of(files.begin(), files.end(), [](const std::string& file) { return !file.empty(); });
   }
 };
 
@@ -140,9 +148,9 @@ void refinePair(const std::string& left_file, const std::string& right_file, Sta
   requireArgument(std::isfinite(outputs.color_max) && outputs.color_max > range.min, "color-max",
                   outputs.color_max, "a number above the smallest disparity, " + std::to_string(range.min));
   const int segments = Segmentation().compute(left, parameters.segmentation(), result.labels);
-  DisparityRefinement().refine(result.disparity, result.labels, left, range,
-                               geometry.focal_length * geometry.baseline, parameters.refinement(),
-                               result.refined);
+  DisparityRefinement refinement;
+  refinement.refine(result.disparity, result.labels, left, range, geometry.focal_length * geometry.baseline,
+                    parameters.refinement(), result.refined);
   result.disparity_range = result.refined_range = range;
 
   // Told when everything is written.
@@ -176,6 +184,20 @@ void refinePair(const std::string& left_file, const std::string& right_file, Sta
     writeImageFile(outputs.picture, drawRefinement(result));
     tell(outputs.picture, "image, segments, disparity before and after");
   }
+  if (!outputs.source.empty() || !outputs.confidence.empty()) {
+    cv::Mat sources, confidence;
+    findSources(result.disparity, result.refined, result.labels, range, refinement.fittedPlanes(), sources);
+    findConfidence(sources, confidence);
+    if (!outputs.source.empty()) {
+      writeImageFile(outputs.source, sources);
+      tell(outputs.source,
+           "source of every disparity, 0 none, 1 measured, 2 own plane, 3 neighbour's, 4 filled");
+    }
+    if (!outputs.confidence.empty()) {
+      writeImageFile(outputs.confidence, confidence);
+      tell(outputs.confidence, "confidence in every disparity, 0 ... 255");
+    }
+  }
   std::cout << text;
 }
 
@@ -187,6 +209,8 @@ void run(int argc, char** argv) {
       "color", file_value(outputs.color), "refined disparity in colours")(
       "pfm", file_value(outputs.pfm), "refined disparity as PFM")("ply", file_value(outputs.ply),
                                                                   "point cloud as PLY")(
+      "source-map", file_value(outputs.source), "where every disparity comes from, 0 ... 4, as PNG")(
+      "confidence-map", file_value(outputs.confidence), "confidence in every disparity, 0 ... 255, as PNG")(
       "picture", file_value(outputs.picture), "image, segments, disparity before and after in one picture")(
       "color-max", po::value(&outputs.color_max)->default_value(outputs.color_max),
       "disparity at the near end of the colour scale [px]")(

@@ -82,6 +82,7 @@ TEST(ZeroCopy, everyEdgePassesThePointer) {
     EXPECT_EQ(log.find("disparity", "received", "right/image_rect", stamp), address(sent.right->data));
     EXPECT_EQ(log.find("segmentation", "received", "left/image_rect", stamp), left);
     EXPECT_EQ(log.find("visualization", "received", "left/image_rect", stamp), left);
+    EXPECT_EQ(log.find("plane_refinement", "received", "left/image_rect", stamp), left);
 
     // Inside the chain: from publisher to subscriber.
     const std::string disparity = log.find("disparity", "published", "disparity", stamp);

@@ -31,7 +31,26 @@ TEST(StageParameters, setsEachTypeByItsName) {
   EXPECT_EQ(parameters.segmentation().gradient.shadow_gamma, 0.5);
   EXPECT_EQ(std::get<int>(parameters.values().at("h")), 7);
   EXPECT_EQ(parameters.values().size(),
-            parameters.matchingValues().size() + 7 /* segmentation */ + 12 /* refinement */);
+            parameters.matchingValues().size() + 7 /* segmentation */ + 13 /* refinement */);
+}
+
+TEST(StageParameters, haveTheModesOfTheLaunchFiles) {
+  StageParameters parameters;
+  EXPECT_FALSE(parameters.matching().full_width);
+  EXPECT_EQ(parameters.refinement().mode, RefinementMode::PAPER);
+  parameters.setMode("quality");
+  EXPECT_TRUE(parameters.matching().full_width);
+  EXPECT_EQ(parameters.matching().stereo_algorithm, StereoAlgorithm::SGBM);
+  EXPECT_EQ(parameters.refinement().mode, RefinementMode::QUALITY);
+  parameters = {};
+  parameters.setMode("fast");
+  EXPECT_TRUE(parameters.matching().full_width);
+  EXPECT_EQ(parameters.matching().stereo_algorithm, StereoAlgorithm::CENSUS_SGM);
+  EXPECT_EQ(parameters.refinement().mode, RefinementMode::PAPER);
+  parameters = {};
+  parameters.setMode("paper");
+  EXPECT_EQ(parameters.values(), StageParameters().values());
+  EXPECT_THROW(parameters.setMode("best"), std::invalid_argument);
 }
 
 TEST(StageParameters, refusesWhatANodeletWouldReplace) {

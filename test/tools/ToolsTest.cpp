@@ -258,6 +258,46 @@ TEST_F(Tools, refineWritesMapAndColoursByDefault) {
   EXPECT_TRUE(fs::exists(out("disparity_refined_color.png")));
 }
 
+TEST_F(Tools, refineWritesSourceAndConfidence) {
+  for (const std::string mode : {"paper", "quality"}) {
+    expectGood("refine " + pair() + " --mode " + mode + " -o " + out("map.png") + " --source-map " +
+               out("source.png") + " --confidence-map " + out("confidence.png"));
+    const cv::Mat map = readDisparityPng(out("map.png"));
+    const cv::Mat source = cv::imread(out("source.png"), cv::IMREAD_UNCHANGED);
+    const cv::Mat confidence = cv::imread(out("confidence.png"), cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(source.type(), CV_8UC1) << mode;
+    ASSERT_EQ(confidence.type(), CV_8UC1) << mode;
+    // In the PNG a disparity of 0 is 1/256 px, so that 0 is unknown there too.
+    EXPECT_EQ(cv::countNonZero((map > 0.0F) != (source > 0)), 0) << mode;
+    EXPECT_EQ(cv::countNonZero(confidence & (source == 0)), 0) << mode;
+    double low = 0.0, high = 0.0;
+    cv::minMaxLoc(source, &low, &high);
+    EXPECT_EQ(high, mode == "paper" ? 2.0 : 3.0) << mode;
+    EXPECT_GT(cv::countNonZero(source == 1), static_cast<int>(source.total()) / 2) << mode;
+  }
+  expectError("refine " + pair() + " --source-map " + out("source.jpg"), "a file name that ends with .png");
+}
+
+TEST_F(Tools, evaluateCountsErrorsByConfidence) {
+  const Outcome outcome =
+      run("evaluate " + training + " --disparity_range 64 --mode quality --by-confidence" + " --json " +
+          out("a.json"));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.text;
+  const std::string json = readText(out("a.json"));
+  for (const std::string name :
+       {"measured", "own plane", "neighbour's plane", "filled", "confidence 0-31", "confidence 224-255"}) {
+    EXPECT_NE(outcome.text.find("\n  " + name + " "), std::string::npos) << name << "\n" << outcome.text;
+    EXPECT_NE(json.find("\"" + name + "\""), std::string::npos) << name;
+  }
+  // What was measured is a smaller risk than what was filled.
+  const auto wrong = [&json](const std::string& name) {
+    const auto at = json.find("\"wrong\": ", json.find("\"" + name + "\""));
+    return std::stod(json.substr(at + 9));
+  };
+  EXPECT_LT(wrong("measured"), wrong("own plane"));
+  EXPECT_LT(wrong("confidence 224-255"), wrong("confidence 96-127"));
+}
+
 TEST_F(Tools, refineExplainsWhatItCannotDo) {
   writeGray(folder / "small.png", 9);
   writeText(folder / "text.png", "no image");
