@@ -49,7 +49,8 @@ class SegmentationNodelet : public LazyNodelet {
     }
     segmentation_ = std::make_unique<Segmentation>(threads);
     worker_ = std::make_unique<FrameWorker<sensor_msgs::ImageConstPtr>>(
-        queue_size_, *monitor_, [this](const sensor_msgs::ImageConstPtr& image) { process(image); });
+        queue_size_, *monitor_, [this](const sensor_msgs::ImageConstPtr& image) { process(image); },
+        getenv("NICE") ? atoi(getenv("NICE")) : 0);
     publisher_ = advertise<sensor_msgs::Image>(nh, "labels");
     monitor_->start();
     start();
