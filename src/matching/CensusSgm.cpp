@@ -30,13 +30,16 @@ const CensusPathsFunctions& functionsFor(CensusSgm::Vectors vectors) {
 
 }  // namespace
 
+static_assert(CensusSgmParameters::MAX_P2 + MAX_CENSUS_COST == 255, "path values are bytes");
+static_assert(CensusSgmParameters::MAX_DISPARITY_RANGE == MAX_DISPARITIES,
+              "the loops' buffers are of this size");
+
 void validate(const CensusSgmParameters& p) {
   requireArgument(p.min_disparity >= -2048 && p.min_disparity <= 2048, "min_disparity", p.min_disparity,
                   "-2048...2048");
-  requireArgument(p.disparity_range >= 1 && p.disparity_range <= 2048, "disparity_range", p.disparity_range,
-                  "1...2048");
-  constexpr int MAX_P2 = 255 - MAX_CENSUS_COST;
-  requireArgument(p.p2 >= 0 && p.p2 <= MAX_P2, "P2", p.p2, "0...224");
+  requireArgument(p.disparity_range >= 1 && p.disparity_range <= p.MAX_DISPARITY_RANGE, "disparity_range",
+                  p.disparity_range, "1..." + std::to_string(p.MAX_DISPARITY_RANGE));
+  requireArgument(p.p2 >= 0 && p.p2 <= p.MAX_P2, "P2", p.p2, "0..." + std::to_string(p.MAX_P2));
   requireArgument(p.p1 >= 0 && p.p1 <= p.p2, "P1", p.p1, "0...P2");
   requireArgument(p.uniqueness_ratio >= 0 && p.uniqueness_ratio <= 99, "uniqueness_ratio", p.uniqueness_ratio,
                   "0...99");
@@ -167,7 +170,8 @@ void CensusSgm::finishRow(const CensusPathsInput& input, const CensusSgmParamete
                           {strip.winners.data(), strip.subpixel.data(), strip.is_ambiguous.data(), right});
   short* disparity = unchecked_.ptr<short>(y);
   std::uint8_t* is_bad = is_bad_.ptr<std::uint8_t>(y);
-  const int max_difference = parameters.disp12_max_diff < 0 ? MAX_DISPARITIES : parameters.disp12_max_diff;
+  const int max_difference =
+      parameters.disp12_max_diff < 0 ? parameters.MAX_DISPARITY_RANGE : parameters.disp12_max_diff;
   for (int x = 0; x < width; ++x) {
     const int d = strip.winners[x];
     const int right_x = x - d - input.min_disparity;

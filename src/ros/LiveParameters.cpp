@@ -8,8 +8,6 @@
 namespace disparity_refinement {
 namespace {
 
-constexpr int MAX_CENSUS_P2 = 224;  // See CensusSgmParameters.
-
 int nextOdd(int value) { return value | 1; }
 
 /// The value as a number, or NaN if it is none.
@@ -48,8 +46,8 @@ MatchingParameters toParameters(DisparityConfig& config) {
       std::clamp(config.correlation_window_size, is_bm ? 5 : 1, is_bm ? 255 : 15);
   config.disparity_range = config.disparity_range / 16 * 16;
   if (config.stereo_algorithm == static_cast<int>(StereoAlgorithm::CENSUS_SGM)) {
-    config.P1 = std::min(config.P1, MAX_CENSUS_P2 - 1);
-    config.P2 = std::min(config.P2, MAX_CENSUS_P2);
+    config.P1 = std::min(config.P1, CensusSgmParameters::MAX_P2 - 1);
+    config.P2 = std::min(config.P2, CensusSgmParameters::MAX_P2);
   }
 
   MatchingParameters parameters;

@@ -12,10 +12,13 @@ struct CensusPathsFunctions;
 struct CensusPathsInput;
 
 struct CensusSgmParameters {
-  int min_disparity = 0;      ///< Smallest disparity searched [px].
-  int disparity_range = 128;  ///< Number of disparities searched [px], 1...2048.
+  static constexpr int MAX_DISPARITY_RANGE = 2048;
+  static constexpr int MAX_P2 = 224;  ///< With the largest cost it fits into a byte.
+
+  int min_disparity = 0;      ///< Smallest disparity searched [px], -2048...2048.
+  int disparity_range = 128;  ///< Number of disparities searched [px], 1...MAX_DISPARITY_RANGE.
   int p1 = 6;                 ///< Penalty of a disparity step of 1 px, 0...p2.
-  int p2 = 50;                ///< Penalty of a larger step, at most 224: path values fit into a byte.
+  int p2 = 50;                ///< Penalty of a larger step, at most MAX_P2.
   int uniqueness_ratio = 0;   ///< Margin by which the least sum must beat others [%], 0...99.
   int disp12_max_diff = 1;    ///< Largest difference to the disparity of the right view [px]; < 0: no check.
 };

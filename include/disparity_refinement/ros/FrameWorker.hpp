@@ -28,10 +28,7 @@ class FrameWorker {
 
   /// @param niceness  Of the thread, 0...19: a stage that has time leaves the processors to the others.
   FrameWorker(std::size_t queue_size, StageMonitor& monitor, Process process, int niceness = 0)
-      : queue_size_(queue_size),
-        monitor_(monitor),
-        process_(std::move(process)),
-        thread_([this, niceness] {
+      : queue_size_(queue_size), monitor_(monitor), process_(std::move(process)), thread_([this, niceness] {
           // On Linux that of the calling thread alone.
           setpriority(PRIO_PROCESS, 0, niceness);
           run();
