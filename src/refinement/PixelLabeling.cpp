@@ -151,6 +151,37 @@ void PixelLabeling::mirror(const cv::Mat& measured, const DisparityRange& range,
   });
 }
 
+// What is invalid is less than every disparity.
+void PixelLabeling::findNearest(const cv::Mat& measured, int reach, int strips) {
+  nearest_in_row_.create(measured.size(), CV_32FC1);
+  nearest_.create(measured.size(), CV_32FC1);
+  const int rows = measured.rows, cols = measured.cols;
+  forEachStrip(strips, [&](int i) {
+    const cv::Range part = stripOf(rows, i, strips);
+    for (int y = part.start; y < part.end; ++y) {
+      const float* d = measured.ptr<float>(y);
+      float* nearest = nearest_in_row_.ptr<float>(y);
+      std::copy(d, d + cols, nearest);
+      for (int offset = 1; offset <= std::min(reach, cols - 1); ++offset) {
+        for (int x = 0; x < cols - offset; ++x) nearest[x] = std::max(nearest[x], d[x + offset]);
+        for (int x = offset; x < cols; ++x) nearest[x] = std::max(nearest[x], d[x - offset]);
+      }
+    }
+  });
+  forEachStrip(strips, [&](int i) {
+    const cv::Range part = stripOf(rows, i, strips);
+    for (int y = part.start; y < part.end; ++y) {
+      float* nearest = nearest_.ptr<float>(y);
+      const int first = std::max(y - reach, 0), last = std::min(y + reach, rows - 1);
+      std::copy_n(nearest_in_row_.ptr<float>(first), cols, nearest);
+      for (int other = first + 1; other <= last; ++other) {
+        const float* row = nearest_in_row_.ptr<float>(other);
+        for (int x = 0; x < cols; ++x) nearest[x] = std::max(nearest[x], row[x]);
+      }
+    }
+  });
+}
+
 void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange& range,
                                    const SegmentRuns& segments, const SegmentGraph& graph,
                                    const std::vector<DisparityPlane>& all_planes,
@@ -180,15 +211,19 @@ void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange
   }
   const short measured_cost = inSteps(p.measured_cost), visibility_cost = inSteps(p.visibility_cost);
   const v_uint16x8 truncation = cv::v_setall_u16(static_cast<std::uint16_t>(inSteps(p.data_truncation)));
-  const v_uint16x8 data_weight =
-      cv::v_setall_u16(static_cast<std::uint16_t>(std::lround(p.data_weight * (1 << WEIGHT_SHIFT))));
+  const auto weightOf = [](double weight) {
+    return cv::v_setall_u16(static_cast<std::uint16_t>(std::lround(weight * (1 << WEIGHT_SHIFT))));
+  };
+  const v_uint16x8 data_weight = weightOf(p.data_weight),
+                   edge_weight = weightOf(p.edge_share * p.data_weight);
+  const float edge_step = static_cast<float>(p.edge_step);
   const float largest = std::min((range.max - range.min) * STEPS, LARGEST_DISPARITY);
   const cv::v_float32x4 zero = cv::v_setzero_f32(), end = cv::v_setall_f32(largest);
   const cv::v_float32x4 slope_low = cv::v_load(slope.data()), slope_high = cv::v_load(slope.data() + 4);
 
   for (const Run& run : runs) {
     const float* d = measured.ptr<float>(run.y);
-    const float* right = right_.ptr<float>(run.y);
+    const float *right = right_.ptr<float>(run.y), *nearest = nearest_.ptr<float>(run.y);
     short* disparities = disparities_.ptr<short>(run.y);
     short* costs = costs_.ptr<short>(run.y);
     std::uint8_t* numbers = numbers_.ptr<std::uint8_t>(run.y);
@@ -211,7 +246,8 @@ void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange
         const float value = std::min((d[x] - range.min) * STEPS, LARGEST_DISPARITY);
         const short own = static_cast<short>(std::floor(value + 0.5F));
         const v_uint16x8 distance = cv::v_min(cv::v_absdiff(planes_here, cv::v_setall_s16(own)), truncation);
-        const v_uint16x8 distance_cost = cv::v_mul_wrap(distance, data_weight) >> WEIGHT_SHIFT;
+        const v_uint16x8 weight = nearest[x] - d[x] > edge_step ? edge_weight : data_weight;
+        const v_uint16x8 distance_cost = cv::v_mul_wrap(distance, weight) >> WEIGHT_SHIFT;
         cv::v_store(cost, cv::v_load(with_measured.data()) + cv::v_reinterpret_as_s16(distance_cost));
         if (n == 0 || std::abs(candidate[0] - own) > SAME * STEPS) {
           candidate[n] = own;
@@ -335,6 +371,7 @@ void PixelLabeling::compute(const cv::Mat& measured, const cv::Mat& gray, const 
   // The sums are of four paths.
   findHalvings(std::max(1, 4 * inSteps(parameters.half_cost)), weights_);
   mirror(measured, range, strips);
+  findNearest(measured, parameters.edge_reach, strips);
   forEachStrip(strips, [&](int i) {
     const cv::Range part = stripOf(segments.size(), i, strips);
     for (int label = part.start; label < part.end; ++label) {

@@ -32,6 +32,10 @@ void validate(const QualityParameters& p) {
   requireCost(p.labeling.data_truncation, "labeling.data_truncation", 16.0);
   requireCost(p.labeling.data_weight * p.labeling.data_truncation, "labeling.data_weight * data_truncation",
               15.0);
+  requireCost(p.labeling.edge_share, "labeling.edge_share", 1.0);
+  requireArgument(p.labeling.edge_reach >= 0 && p.labeling.edge_reach <= 16, "labeling.edge_reach",
+                  p.labeling.edge_reach, "0...16");
+  requireCost(p.labeling.edge_step, "labeling.edge_step", 2048.0);
   requireCost(p.labeling.neighbour_cost, "labeling.neighbour_cost", 100.0);
   requireCost(p.labeling.neighbour_cost_in_hole, "labeling.neighbour_cost_in_hole", 100.0);
   requireCost(p.labeling.measured_cost, "labeling.measured_cost", 100.0);

@@ -125,6 +125,7 @@ constexpr QualityStep QUALITY_STEPS[] = {
     {"plane selection", [](QualityParameters& p) { p.selection.sweeps = 0; }},
     {"plane smoothing", [](QualityParameters& p) { p.smoothing.sweeps = 0; }},
     {"pixel labeling", [](QualityParameters& p) { p.label_pixels = false; }},
+    {"less weight behind edges", [](QualityParameters& p) { p.labeling.edge_share = 1.0; }},
     {"soft output", [](QualityParameters& p) { p.labeling.soft_reach = 0.0; }},
     {"medians", [](QualityParameters& p) { p.medians = 0; }},
 };

@@ -97,6 +97,20 @@ class Straightforward {
     return nearest;
   }
 
+  // Whether something nearer was measured close by.
+  bool isBehindEdge(const cv::Point& pixel) const {
+    const cv::Rect reach(pixel.x - p_.edge_reach, pixel.y - p_.edge_reach, 2 * p_.edge_reach + 1,
+                         2 * p_.edge_reach + 1);
+    const cv::Rect window = reach & cv::Rect({0, 0}, size());
+    for (int y = window.y; y < window.y + window.height; ++y) {
+      for (int x = window.x; x < window.x + window.width; ++x) {
+        const float d = scene_.measured.at<float>(y, x);
+        if (scene_.range.isValid(d) && d - scene_.measured.at<float>(pixel) > p_.edge_step) return true;
+      }
+    }
+    return false;
+  }
+
   void findCandidates() {
     candidates_.resize(size().area());
     const int most = std::min(32767, static_cast<int>(16.0F * (scene_.range.max - scene_.range.min)));
@@ -116,7 +130,8 @@ class Straightforward {
           if (!candidates.empty())
             cost = inSteps(is_measured ? p_.neighbour_cost : p_.neighbour_cost_in_hole);
           if (is_measured) {
-            cost += weigh(std::min(std::abs(disparity - own), inSteps(p_.data_truncation)), p_.data_weight);
+            const double weight = isBehindEdge({x, y}) ? p_.edge_share * p_.data_weight : p_.data_weight;
+            cost += weigh(std::min(std::abs(disparity - own), inSteps(p_.data_truncation)), weight);
           }
           candidates.push_back({disparity, cost});
         }
@@ -251,6 +266,9 @@ TEST(PixelLabeling, isTheStraightforwardOne) {
     if (trial % 3 == 1) {  // As far as they may go.
       parameters.data_weight = 10.0;
       parameters.data_truncation = 1.5;
+      parameters.edge_share = 0.0;
+      parameters.edge_reach = 16;
+      parameters.edge_step = 0.0;
       parameters.neighbour_cost = parameters.neighbour_cost_in_hole = 100.0;
       parameters.measured_cost = parameters.visibility_cost = 100.0;
       parameters.smoothness = 0.9375;
@@ -259,6 +277,9 @@ TEST(PixelLabeling, isTheStraightforwardOne) {
       parameters.half_cost = 100.0;
     } else if (trial % 3 == 2) {
       parameters.data_weight = random.uniform(0.0, 3.0);
+      parameters.edge_share = random.uniform(0.0, 1.0);
+      parameters.edge_reach = random.uniform(0, 6);
+      parameters.edge_step = random.uniform(0.0, 6.0);
       parameters.neighbour_cost = random.uniform(0.0, 2.0);
       parameters.neighbour_cost_in_hole = random.uniform(0.0, 2.0);
       parameters.measured_cost = random.uniform(0.0, 2.0);
@@ -355,7 +376,7 @@ TEST(PixelLabeling, fillsTheHoleBesideABoxWithTheWall) {
 }
 
 TEST(PixelLabeling, takesTheNeighboursPlaneWhereItWasMeasured) {
-  // The segment reaches 6 columns too far.
+  // The segment reaches 6 columns too far; those beside the step count as much as the others.
   const DisparityPlane left{0.0, 0.0, 10.0, true}, right{0.0, 0.0, 30.0, true};
   PlaneScene scene({60, 20});
   scene.measure(0, left);
@@ -364,8 +385,39 @@ TEST(PixelLabeling, takesTheNeighboursPlaneWhereItWasMeasured) {
   scene.gray.colRange(30, 60).setTo(200);
   scene.prepare();
   scene.planes = {left, right};
-  const cv::Mat result = label(scene);
+  PixelLabelingParameters parameters;
+  parameters.edge_share = 1.0;
+  const cv::Mat result = label(scene, parameters);
   for (int x = 0; x < 60; ++x) EXPECT_EQ(result.at<float>(10, x), x < 30 ? 10.0F : 30.0F) << x;
+}
+
+TEST(PixelLabeling, believesTheImageBesideADepthStep) {
+  // The measured map begins 2 columns behind the edge of a near thing that its segment keeps to.
+  const DisparityPlane wall{0.0, 0.0, 10.0, true}, near{0.0, 0.0, 30.0, true};
+  PlaneScene scene({80, 20});
+  scene.measure(0, wall);
+  scene.labels.colRange(40, 80).setTo(1);
+  scene.gray.colRange(40, 80).setTo(200);
+  scene.measured.colRange(42, 80).setTo(30.0F);
+  scene.measured.colRange(20, 40).setTo(scene.range.invalid());  // The right camera does not see it.
+  scene.prepare();
+  scene.planes = {wall, near};
+  PixelLabelingParameters parameters;
+  const cv::Mat result = label(scene, parameters);
+  for (int x = 0; x < 80; ++x) EXPECT_EQ(result.at<float>(10, x), x < 40 ? 10.0F : 30.0F) << x;
+  // Beyond the reach, for smaller steps, and with the full weight it believes what was measured.
+  const auto expectMeasured = [&](const PixelLabelingParameters& changed) {
+    const cv::Mat other = label(scene, changed);
+    for (int x = 0; x < 80; ++x) EXPECT_EQ(other.at<float>(10, x), x < 42 ? 10.0F : 30.0F) << x;
+  };
+  parameters.edge_share = 1.0;
+  expectMeasured(parameters);
+  parameters = {};
+  parameters.edge_reach = 0;
+  expectMeasured(parameters);
+  parameters = {};
+  parameters.edge_step = 20.0;
+  expectMeasured(parameters);
 }
 
 TEST(PixelLabeling, leavesPixelsOfNoSegment) {

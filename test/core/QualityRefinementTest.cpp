@@ -717,6 +717,8 @@ TEST(QualityRefinement, validatesEveryParameter) {
   expectCost("selection.border_weight", [](P& p) -> double& { return p.selection.border_weight; });
   expectCost("smoothing.border_weight", [](P& p) -> double& { return p.smoothing.border_weight; });
   expectCost("labeling.data_weight", [](P& p) -> double& { return p.labeling.data_weight; });
+  expectCost("labeling.edge_share", [](P& p) -> double& { return p.labeling.edge_share; });
+  expectCost("labeling.edge_step", [](P& p) -> double& { return p.labeling.edge_step; });
   expectCost("labeling.neighbour_cost", [](P& p) -> double& { return p.labeling.neighbour_cost; });
   expectCost("labeling.neighbour_cost_in_hole",
              [](P& p) -> double& { return p.labeling.neighbour_cost_in_hole; });
@@ -732,6 +734,11 @@ TEST(QualityRefinement, validatesEveryParameter) {
     p.labeling.data_weight = 8.0;
     p.labeling.data_truncation = 2.0;
   });
+  expectRefused("labeling.edge_share is 1.1,", [](P& p) { p.labeling.edge_share = 1.1; });
+  expectRefused("labeling.edge_reach is -1, expected 0...16", [](P& p) { p.labeling.edge_reach = -1; });
+  expectRefused("labeling.edge_reach is 17, expected 0...16", [](P& p) { p.labeling.edge_reach = 17; });
+  expectRefused("labeling.edge_step is 2049,", [](P& p) { p.labeling.edge_step = 2049.0; });
+  expectAccepted([](P& p) { p.labeling.edge_reach = 0; });
   expectRefused("labeling.neighbour_cost is 101,", [](P& p) { p.labeling.neighbour_cost = 101.0; });
   expectRefused("labeling.neighbour_cost_in_hole is 101,",
                 [](P& p) { p.labeling.neighbour_cost_in_hole = 101.0; });

@@ -131,15 +131,15 @@ TEST_F(Tools, evaluateRefinesBeyondThePaper) {
   const std::string settings = training + " --disparity_range 64 --full_width true --frames 0 --mode quality";
   const Outcome outcome = run("evaluate " + settings + " --ablation --json " + out("a.json"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.text;
-  // The matcher, the planes, five more steps, and five times all steps but one.
+  // The matcher, the planes, six more steps, and six times all steps but one.
   const std::string json = readText(out("a.json"));
   int methods = 0;
   for (auto at = json.find("\"name\""); at != std::string::npos; at = json.find("\"name\"", at + 1))
     ++methods;
-  EXPECT_EQ(methods, 12);
+  EXPECT_EQ(methods, 14);
   for (const std::string name :
        {"SGBM 3WAY + (30,5) quality: planes", "+ plane selection", "+ plane smoothing", "+ pixel labeling",
-        "+ soft output", "+ medians", "all without medians"}) {
+        "+ less weight behind edges", "+ soft output", "+ medians", "all without medians"}) {
     EXPECT_NE(json.find("\"name\": \"" + name + "\""), std::string::npos) << name;
   }
 

@@ -16,6 +16,12 @@ struct PixelLabelingParameters {
   /// more [px], > 0 and at most 16; their product is at most 15.
   double data_weight = 1.3;
   double data_truncation = 2.0;
+  /// The far side of a depth step is measured less reliably: share of data_weight that counts, 0...1, where
+  /// within edge_reach [px] in x and y, 0...16, something was measured that is nearer by more than edge_step
+  /// [px], >= 0. A share of 1 or a reach of 0: the step is left out.
+  double edge_share = 0.25;
+  int edge_reach = 3;
+  double edge_step = 3.0;
   /// Cost of a neighbour's plane, 0...100, where the pixel has a measured disparity and where it has none.
   double neighbour_cost = 1.2;
   double neighbour_cost_in_hole = 0.5;
@@ -69,6 +75,7 @@ class PixelLabeling {
   };
 
   void mirror(const cv::Mat& measured, const DisparityRange& range, int strips);
+  void findNearest(const cv::Mat& measured, int reach, int strips);
   void findCandidates(const cv::Mat& measured, const DisparityRange& range, const SegmentRuns& segments,
                       const SegmentGraph& graph, const std::vector<DisparityPlane>& planes,
                       const PixelLabelingParameters& parameters, int label, Strip& strip);
@@ -77,6 +84,8 @@ class PixelLabeling {
               int strips, cv::Mat& result) const;
 
   cv::Mat right_;                // The measured map as the right camera sees it.
+  cv::Mat nearest_in_row_;       // Largest of what was measured within reach, in x,
+  cv::Mat nearest_;              // and in x and y.
   cv::Mat disparities_, costs_;  // Of the candidates of every pixel [1/16 px].
   cv::Mat sums_;                 // Of the four paths.
   cv::Mat numbers_;              // Of candidates.
