@@ -53,6 +53,66 @@ struct Planes {
   }
 };
 
+// Cost of a plane where something was measured, and where not.
+struct PlaneCost {
+  short with_measured, in_hole;
+};
+
+// The planes that are candidates on pixels x_begin ... x_end - 1 of a row.
+class Stretch {
+ public:
+  Stretch(int y, int x_begin, int x_end, float min_disparity)
+      : y_(y), x_begin_(x_begin), x_last_(x_end - 1), min_disparity_(min_disparity) {
+    with_measured_.fill(NO_CANDIDATE);
+    in_hole_.fill(NO_CANDIDATE);
+  }
+
+  int size() const { return size_; }
+
+  // Unless there is one like it.
+  void add(const DisparityPlane& plane, const PlaneCost& cost) {
+    if (!plane.is_known || size_ == MAX_PLANES) return;
+    const double begin = plane.at(x_begin_, y_), last = plane.at(x_last_, y_);
+    for (int i = 0; i < size_; ++i) {
+      if (std::abs(begin - begin_[i]) < SAME && std::abs(last - last_[i]) < SAME) return;
+    }
+    begin_[size_] = begin;
+    last_[size_] = last;
+    first_[size_] = static_cast<float>((begin - min_disparity_) * STEPS);
+    slope_[size_] = static_cast<float>(plane.a * STEPS);
+    with_measured_[size_] = cost.with_measured;
+    in_hole_[size_] = cost.in_hole;
+    ++size_;
+  }
+
+  // In steps, at the first pixel and from one to the next, of four planes: coordinates relative to the first
+  // pixel are small enough for single precision.
+  cv::v_float32x4 first(int plane) const { return cv::v_load(&first_[plane]); }
+  cv::v_float32x4 slope(int plane) const { return cv::v_load(&slope_[plane]); }
+  v_int16x8 costsWithMeasured() const { return cv::v_load(with_measured_.data()); }
+  v_int16x8 costsInHole() const { return cv::v_load(in_hole_.data()); }
+
+ private:
+  int y_, x_begin_, x_last_;
+  float min_disparity_;
+  int size_ = 0;
+  std::array<double, MAX_PLANES> begin_, last_;
+  std::array<float, CANDIDATES> first_{}, slope_{};
+  std::array<short, CANDIDATES> with_measured_, in_hole_;
+};
+
+// Where the first label of any further segmentation changes after x, at the latest the end of the run.
+int endOfStretch(const std::vector<FurtherPlanes>& further, const Run& run, int x) {
+  int end = run.x_end;
+  for (const FurtherPlanes& other : further) {
+    const int* label = other.labels->ptr<int>(run.y);
+    int other_end = x + 1;
+    while (other_end < end && label[other_end] == label[x]) ++other_end;
+    end = other_end;
+  }
+  return end;
+}
+
 // Where the right image shows what is in column x at disparity d; -1 outside of it.
 int columnInRight(int x, float d, int columns) {
   const float column = std::floor(static_cast<float>(x) - d + 0.5F);
@@ -185,12 +245,14 @@ void PixelLabeling::findNearest(const cv::Mat& measured, int reach, int strips) 
 void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange& range,
                                    const SegmentRuns& segments, const SegmentGraph& graph,
                                    const std::vector<DisparityPlane>& all_planes,
+                                   const std::vector<FurtherPlanes>& further,
                                    const PixelLabelingParameters& p, int label, Strip& strip) {
   const RunSpan runs = segments[label];
   if (runs.begin() == runs.end()) return;
   const cv::Rect box = boxOf(runs);
   Planes planes;
   planes.add(all_planes[label], box);
+  const int own_planes = planes.size;
   const SegmentGraph::Borders borders = graph.bordersOf(label);
   growTo(strip.borders, borders.end() - borders.begin(), USUAL_BORDERS);
   strip.borders.assign(borders.begin(), borders.end());
@@ -199,16 +261,9 @@ void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange
   });
   for (const SegmentGraph::Border& border : strip.borders) planes.add(all_planes[border.neighbour], box);
 
-  // Cost of the planes where something was measured, and where not.
-  std::array<short, CANDIDATES> with_measured, in_hole;
-  std::array<float, CANDIDATES> slope{};
-  with_measured.fill(NO_CANDIDATE);
-  in_hole.fill(NO_CANDIDATE);
-  for (int i = 0; i < planes.size; ++i) {
-    with_measured[i] = i == 0 ? 0 : inSteps(p.neighbour_cost);
-    in_hole[i] = i == 0 ? 0 : inSteps(p.neighbour_cost_in_hole);
-    slope[i] = static_cast<float>(planes.plane[i].a * STEPS);
-  }
+  const PlaneCost free{0, 0};
+  const PlaneCost further_cost{inSteps(p.further_cost), inSteps(p.further_cost_in_hole)};
+  const PlaneCost neighbour_cost{inSteps(p.neighbour_cost), inSteps(p.neighbour_cost_in_hole)};
   const short measured_cost = inSteps(p.measured_cost), visibility_cost = inSteps(p.visibility_cost);
   const v_uint16x8 truncation = cv::v_setall_u16(static_cast<std::uint16_t>(inSteps(p.data_truncation)));
   const auto weightOf = [](double weight) {
@@ -219,7 +274,6 @@ void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange
   const float edge_step = static_cast<float>(p.edge_step);
   const float largest = std::min((range.max - range.min) * STEPS, LARGEST_DISPARITY);
   const cv::v_float32x4 zero = cv::v_setzero_f32(), end = cv::v_setall_f32(largest);
-  const cv::v_float32x4 slope_low = cv::v_load(slope.data()), slope_high = cv::v_load(slope.data() + 4);
 
   for (const Run& run : runs) {
     const float* d = measured.ptr<float>(run.y);
@@ -227,42 +281,54 @@ void PixelLabeling::findCandidates(const cv::Mat& measured, const DisparityRange
     short* disparities = disparities_.ptr<short>(run.y);
     short* costs = costs_.ptr<short>(run.y);
     std::uint8_t* numbers = numbers_.ptr<std::uint8_t>(run.y);
-    // At the first pixel of the run; coordinates relative to it are small enough for single precision.
-    std::array<float, CANDIDATES> first{};
-    for (int i = 0; i < planes.size; ++i) {
-      first[i] = static_cast<float>((planes.plane[i].at(run.x_begin, run.y) - range.min) * STEPS);
-    }
-    const cv::v_float32x4 first_low = cv::v_load(first.data()), first_high = cv::v_load(first.data() + 4);
-    for (int x = run.x_begin; x < run.x_end; ++x) {
-      const cv::v_float32x4 offset = cv::v_setall_f32(static_cast<float>(x - run.x_begin));
-      const cv::v_float32x4 low = cv::v_min(cv::v_max(first_low + slope_low * offset, zero), end);
-      const cv::v_float32x4 high = cv::v_min(cv::v_max(first_high + slope_high * offset, zero), end);
-      const v_int16x8 planes_here = cv::v_pack(cv::v_round(low), cv::v_round(high));
-      short* candidate = disparities + x * CANDIDATES;
-      short* cost = costs + x * CANDIDATES;
-      cv::v_store(candidate, planes_here);
-      int n = planes.size;
-      if (range.isValid(d[x])) {
-        const float value = std::min((d[x] - range.min) * STEPS, LARGEST_DISPARITY);
-        const short own = static_cast<short>(std::floor(value + 0.5F));
-        const v_uint16x8 distance = cv::v_min(cv::v_absdiff(planes_here, cv::v_setall_s16(own)), truncation);
-        const v_uint16x8 weight = nearest[x] - d[x] > edge_step ? edge_weight : data_weight;
-        const v_uint16x8 distance_cost = cv::v_mul_wrap(distance, weight) >> WEIGHT_SHIFT;
-        cv::v_store(cost, cv::v_load(with_measured.data()) + cv::v_reinterpret_as_s16(distance_cost));
-        if (n == 0 || std::abs(candidate[0] - own) > SAME * STEPS) {
-          candidate[n] = own;
-          cost[n] = measured_cost;
-          ++n;
-        }
-      } else {
-        cv::v_store(cost, cv::v_load(in_hole.data()));
+    for (int x_begin = run.x_begin, x_end = 0; x_begin < run.x_end; x_begin = x_end) {
+      x_end = endOfStretch(further, run, x_begin);
+      Stretch stretch(run.y, x_begin, x_end, range.min);
+      const auto add = [&](const DisparityPlane& plane, const PlaneCost& cost) {
+        stretch.add(plane, stretch.size() == 0 ? free : cost);
+      };
+      for (int i = 0; i < own_planes; ++i) add(planes.plane[i], free);
+      for (const FurtherPlanes& other : further) {
+        const int other_label = other.labels->at<int>(run.y, x_begin);
+        if (other_label >= 0) add((*other.planes)[other_label], further_cost);
       }
-      numbers[x] = static_cast<std::uint8_t>(n);
-      if (n < 2) continue;
-      for (int i = 0; i < n; ++i) {
-        const float at = range.min + static_cast<float>(candidate[i]) / STEPS;
-        const int column = columnInRight(x, at, measured.cols);
-        if (column >= 0 && right[column] < at - 1.0F) cost[i] = static_cast<short>(cost[i] + visibility_cost);
+      for (int i = own_planes; i < planes.size; ++i) add(planes.plane[i], neighbour_cost);
+      const cv::v_float32x4 first_low = stretch.first(0), first_high = stretch.first(4);
+      const cv::v_float32x4 slope_low = stretch.slope(0), slope_high = stretch.slope(4);
+      const v_int16x8 with_measured = stretch.costsWithMeasured(), in_hole = stretch.costsInHole();
+      for (int x = x_begin; x < x_end; ++x) {
+        const cv::v_float32x4 offset = cv::v_setall_f32(static_cast<float>(x - x_begin));
+        const cv::v_float32x4 low = cv::v_min(cv::v_max(first_low + slope_low * offset, zero), end);
+        const cv::v_float32x4 high = cv::v_min(cv::v_max(first_high + slope_high * offset, zero), end);
+        const v_int16x8 planes_here = cv::v_pack(cv::v_round(low), cv::v_round(high));
+        short* candidate = disparities + x * CANDIDATES;
+        short* cost = costs + x * CANDIDATES;
+        cv::v_store(candidate, planes_here);
+        int n = stretch.size();
+        if (range.isValid(d[x])) {
+          const float value = std::min((d[x] - range.min) * STEPS, LARGEST_DISPARITY);
+          const short own = static_cast<short>(std::floor(value + 0.5F));
+          const v_uint16x8 distance =
+              cv::v_min(cv::v_absdiff(planes_here, cv::v_setall_s16(own)), truncation);
+          const v_uint16x8 weight = nearest[x] - d[x] > edge_step ? edge_weight : data_weight;
+          const v_uint16x8 distance_cost = cv::v_mul_wrap(distance, weight) >> WEIGHT_SHIFT;
+          cv::v_store(cost, with_measured + cv::v_reinterpret_as_s16(distance_cost));
+          if (n == 0 || std::abs(candidate[0] - own) > SAME * STEPS) {
+            candidate[n] = own;
+            cost[n] = measured_cost;
+            ++n;
+          }
+        } else {
+          cv::v_store(cost, in_hole);
+        }
+        numbers[x] = static_cast<std::uint8_t>(n);
+        if (n < 2) continue;
+        for (int i = 0; i < n; ++i) {
+          const float at = range.min + static_cast<float>(candidate[i]) / STEPS;
+          const int column = columnInRight(x, at, measured.cols);
+          if (column >= 0 && right[column] < at - 1.0F)
+            cost[i] = static_cast<short>(cost[i] + visibility_cost);
+        }
       }
     }
   }
@@ -359,6 +425,7 @@ void PixelLabeling::choose(const cv::Mat& measured, const DisparityRange& range,
 void PixelLabeling::compute(const cv::Mat& measured, const cv::Mat& gray, const DisparityRange& range,
                             const SegmentRuns& segments, const SegmentGraph& graph,
                             const std::vector<DisparityPlane>& planes,
+                            const std::vector<FurtherPlanes>& further,
                             const PixelLabelingParameters& parameters, cv::Mat& result) {
   const int strips = std::max(1, cv::getNumThreads());
   strips_.resize(std::max<std::size_t>(strips_.size(), strips));
@@ -375,7 +442,7 @@ void PixelLabeling::compute(const cv::Mat& measured, const cv::Mat& gray, const 
   forEachStrip(strips, [&](int i) {
     const cv::Range part = stripOf(segments.size(), i, strips);
     for (int label = part.start; label < part.end; ++label) {
-      findCandidates(measured, range, segments, graph, planes, parameters, label, strips_[i]);
+      findCandidates(measured, range, segments, graph, planes, further, parameters, label, strips_[i]);
     }
   });
   addPaths(gray, parameters, strips);

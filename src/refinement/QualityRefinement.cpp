@@ -38,6 +38,8 @@ void validate(const QualityParameters& p) {
   requireCost(p.labeling.edge_step, "labeling.edge_step", 2048.0);
   requireCost(p.labeling.neighbour_cost, "labeling.neighbour_cost", 100.0);
   requireCost(p.labeling.neighbour_cost_in_hole, "labeling.neighbour_cost_in_hole", 100.0);
+  requireCost(p.labeling.further_cost, "labeling.further_cost", 100.0);
+  requireCost(p.labeling.further_cost_in_hole, "labeling.further_cost_in_hole", 100.0);
   requireCost(p.labeling.measured_cost, "labeling.measured_cost", 100.0);
   requireCost(p.labeling.visibility_cost, "labeling.visibility_cost", 100.0);
   requireCost(p.labeling.smoothness, "labeling.smoothness", 15.0);
@@ -49,14 +51,48 @@ void validate(const QualityParameters& p) {
   requireCost(p.labeling.soft_reach, "labeling.soft_reach", 1000.0);
   requirePositive(p.labeling.half_cost, "labeling.half_cost");
   requireCost(p.labeling.half_cost, "labeling.half_cost", 100.0);
+  requireArgument(p.further.size() <= 5, "number of further segmentations", p.further.size(), "at most 5");
+  for (const SegmentationParameters& segmentation : p.further) validate(segmentation);
   requireArgument(p.medians >= 0, "medians", p.medians, "at least 0");
+}
+
+// The labels must be those of the fitting.
+void QualityRefinement::Planes::find(const cv::Mat& measured, const cv::Mat& labels, const cv::Mat& gray,
+                                     const DisparityRange& range, const PlaneRefinementParameters& fit,
+                                     const QualityParameters& parameters) {
+  const int segments = fitting.segments().size();
+  growTo(support, segments);
+  growTo(fitted, segments);
+  fitted.resize(segments);
+  fitting.fit(measured, range, fit, [&](int label, const SegmentPlane& plane, const SegmentPoints& points) {
+    support[label].valid = support[label].size = 0;
+    if (plane.pixels > 0) support[label].sample(points);
+    fitted[label] = {plane.a, plane.b, plane.c, plane.status == PlaneStatus::ACCEPTED};
+  });
+  graph.build(labels, gray, segments, parameters.half_contrast);
+  selectPlanes(graph, support, parameters.selection, fitted, chosen);
+  smoothPlanes(fitting.segments(), graph, support, parameters.smoothing, chosen);
+}
+
+void QualityRefinement::findFurtherPlanes(const cv::Mat& gray, const DisparityRange& range,
+                                          const PlaneRefinementParameters& fit,
+                                          const QualityParameters& parameters) {
+  further_.resize(std::max(further_.size(), parameters.further.size()));
+  further_planes_.clear();
+  for (std::size_t i = 0; i < parameters.further.size(); ++i) {
+    Planes& planes = further_[i];
+    segmentation_.compute(gray, parameters.further[i], planes.own_labels);
+    planes.fitting.setLabels(planes.own_labels);
+    planes.find(measured_, planes.own_labels, gray, range, fit, parameters);
+    further_planes_.push_back({&planes.own_labels, &planes.chosen});
+  }
 }
 
 void QualityRefinement::takePlanes(const DisparityRange& range, double max_divergence,
                                    cv::Mat& refined) const {
-  const SegmentRuns& segments = fitting_.segments();
+  const SegmentRuns& segments = planes_.fitting.segments();
   for (int label = 0; label < segments.size(); ++label) {
-    const DisparityPlane& plane = planes_[label];
+    const DisparityPlane& plane = planes_.chosen[label];
     if (!plane.is_known) continue;
     for (const Run& run : segments[label]) {
       float* row = refined.ptr<float>(run.y);
@@ -83,28 +119,18 @@ void QualityRefinement::refine(const cv::Mat& disparity, const cv::Mat& labels, 
   for (const cv::Mat* input : {&disparity, &labels, &gray}) {
     requireArgument(!overlap(refined, *input), "refined", "the memory of an input", "an image of its own");
   }
-  fitting_.setLabels(labels);
+  planes_.fitting.setLabels(labels);
 
   copyValid(disparity, range, measured_);
-  const int segments = fitting_.segments().size();
-  growTo(support_, segments);
-  growTo(fitted_, segments);
-  fitted_.resize(segments);
-  fitting_.fit(measured_, range, fit, [&](int label, const SegmentPlane& plane, const SegmentPoints& points) {
-    support_[label].valid = support_[label].size = 0;
-    if (plane.pixels > 0) support_[label].sample(points);
-    fitted_[label] = {plane.a, plane.b, plane.c, plane.status == PlaneStatus::ACCEPTED};
-  });
-  graph_.build(labels, gray, segments, parameters.half_contrast);
-  selectPlanes(graph_, support_, parameters.selection, fitted_, planes_);
-  smoothPlanes(fitting_.segments(), graph_, support_, parameters.smoothing, planes_);
+  planes_.find(measured_, labels, gray, range, fit, parameters);
 
   refined.create(disparity.size(), CV_32FC1);
   cv::Mat& chosen = parameters.medians > 0 ? chosen_ : refined;
   chosen.create(disparity.size(), CV_32FC1);
   if (parameters.label_pixels) {
-    labeling_.compute(measured_, gray, range, fitting_.segments(), graph_, planes_, parameters.labeling,
-                      chosen);
+    findFurtherPlanes(gray, range, fit, parameters);
+    labeling_.compute(measured_, gray, range, planes_.fitting.segments(), planes_.graph, planes_.chosen,
+                      further_planes_, parameters.labeling, chosen);
   } else {
     measured_.copyTo(chosen);
     takePlanes(range, fit.max_divergence, chosen);

@@ -121,26 +121,34 @@ struct QualityStep {
   void (*leaveOut)(QualityParameters&);
 };
 
+constexpr const char* FURTHER_SEGMENTATIONS = "further segmentations";
+
 constexpr QualityStep QUALITY_STEPS[] = {
     {"plane selection", [](QualityParameters& p) { p.selection.sweeps = 0; }},
     {"plane smoothing", [](QualityParameters& p) { p.smoothing.sweeps = 0; }},
     {"pixel labeling", [](QualityParameters& p) { p.label_pixels = false; }},
     {"less weight behind edges", [](QualityParameters& p) { p.labeling.edge_share = 1.0; }},
+    {FURTHER_SEGMENTATIONS, [](QualityParameters& p) { p.further.clear(); }},
     {"soft output", [](QualityParameters& p) { p.labeling.soft_reach = 0.0; }},
     {"medians", [](QualityParameters& p) { p.medians = 0; }},
 };
 
 /// The method with the first steps only, one row for every number of them, and then without one step alone.
 std::vector<EvaluatedMethod> ablation(const EvaluatedMethod& complete) {
+  std::vector<QualityStep> all_steps;
+  for (const QualityStep& step : QUALITY_STEPS) {
+    const bool is_made = std::string(step.name) != FURTHER_SEGMENTATIONS || !complete.quality.further.empty();
+    if (is_made) all_steps.push_back(step);
+  }
   std::vector<EvaluatedMethod> methods;
-  const int steps = static_cast<int>(std::size(QUALITY_STEPS));
+  const int steps = static_cast<int>(all_steps.size());
   for (int made = 0; made <= steps; ++made) {
     EvaluatedMethod method = complete;
-    for (int i = made; i < steps; ++i) QUALITY_STEPS[i].leaveOut(method.quality);
-    method.name = made == 0 ? complete.name + ": planes" : "+ " + std::string(QUALITY_STEPS[made - 1].name);
+    for (int i = made; i < steps; ++i) all_steps[i].leaveOut(method.quality);
+    method.name = made == 0 ? complete.name + ": planes" : "+ " + std::string(all_steps[made - 1].name);
     methods.push_back(method);
   }
-  for (const QualityStep& step : QUALITY_STEPS) {
+  for (const QualityStep& step : all_steps) {
     EvaluatedMethod method = complete;
     step.leaveOut(method.quality);
     method.name = "all without " + std::string(step.name);

@@ -19,8 +19,9 @@ namespace {
 // above the least one of the range.
 class Straightforward {
  public:
-  Straightforward(const PlaneScene& scene, const PixelLabelingParameters& parameters)
-      : scene_(scene), p_(parameters) {}
+  Straightforward(const PlaneScene& scene, const std::vector<FurtherPlanes>& further,
+                  const PixelLabelingParameters& parameters)
+      : scene_(scene), further_(further), p_(parameters) {}
 
   cv::Mat compute() {
     findPlanes();
@@ -49,6 +50,48 @@ class Straightforward {
   // Weights are multiples of 1/256, their products are cut.
   static int weigh(int value, double weight) {
     return (value * static_cast<int>(std::lround(256.0 * weight))) / 256;
+  }
+
+  // The pixels of the row about this one where no label changes: the first and the last column.
+  std::pair<int, int> stretchAt(const cv::Point& pixel) const {
+    const auto isSame = [&](int x) {
+      if (x < 0 || x >= size().width || labelAt({x, pixel.y}) != labelAt(pixel)) return false;
+      return std::all_of(further_.begin(), further_.end(), [&](const FurtherPlanes& other) {
+        return other.labels->at<int>(pixel.y, x) == other.labels->at<int>(pixel);
+      });
+    };
+    int first = pixel.x, last = pixel.x;
+    while (isSame(first - 1)) --first;
+    while (isSame(last + 1)) ++last;
+    return {first, last};
+  }
+
+  // The planes that are candidates of a pixel, with their costs.
+  std::vector<std::pair<DisparityPlane, int>> planesAt(const cv::Point& pixel, bool is_measured) const {
+    const auto [first, last] = stretchAt(pixel);
+    std::vector<std::pair<DisparityPlane, int>> planes;
+    const auto add = [&, first = first, last = last](const DisparityPlane& plane, double with_measured,
+                                                     double in_hole) {
+      if (!plane.is_known || planes.size() == 7) return;
+      for (const auto& [other, cost] : planes) {
+        if (std::abs(plane.at(first, pixel.y) - other.at(first, pixel.y)) < 0.5 &&
+            std::abs(plane.at(last, pixel.y) - other.at(last, pixel.y)) < 0.5)
+          return;
+      }
+      planes.emplace_back(plane, planes.empty() ? 0 : inSteps(is_measured ? with_measured : in_hole));
+    };
+    const int label = labelAt(pixel);
+    const std::vector<DisparityPlane>& own_and_neighbours = planes_[label];
+    const std::size_t own = scene_.planes[label].is_known ? 1 : 0;
+    for (std::size_t i = 0; i < own; ++i) add(own_and_neighbours[i], 0.0, 0.0);
+    for (const FurtherPlanes& other : further_) {
+      const int other_label = other.labels->at<int>(pixel);
+      if (other_label >= 0) add((*other.planes)[other_label], p_.further_cost, p_.further_cost_in_hole);
+    }
+    for (std::size_t i = own; i < own_and_neighbours.size(); ++i) {
+      add(own_and_neighbours[i], p_.neighbour_cost, p_.neighbour_cost_in_hole);
+    }
+    return planes;
   }
 
   // The planes of every segment: its own and those of the neighbours with the longest borders, up to 7.
@@ -123,12 +166,10 @@ class Straightforward {
         // What does not fit into 16 bits is the largest that does.
         const int own =
             static_cast<int>(std::floor(std::min(16.0F * (d - scene_.range.min), 32767.0F) + 0.5F));
-        for (const DisparityPlane& plane : planes_[labelAt({x, y})]) {
+        for (const auto& [plane, plane_cost] : planesAt({x, y}, is_measured)) {
           const double above = 16.0 * (plane.at(x, y) - scene_.range.min);
           const int disparity = static_cast<int>(std::nearbyint(std::min(std::max(above, 0.0), 1.0 * most)));
-          int cost = 0;
-          if (!candidates.empty())
-            cost = inSteps(is_measured ? p_.neighbour_cost : p_.neighbour_cost_in_hole);
+          int cost = plane_cost;
           if (is_measured) {
             const double weight = isBehindEdge({x, y}) ? p_.edge_share * p_.data_weight : p_.data_weight;
             cost += weigh(std::min(std::abs(disparity - own), inSteps(p_.data_truncation)), weight);
@@ -199,23 +240,25 @@ class Straightforward {
   }
 
   const PlaneScene& scene_;
+  const std::vector<FurtherPlanes> further_;
   const PixelLabelingParameters p_;
   std::vector<std::vector<DisparityPlane>> planes_;
   std::vector<std::vector<Candidate>> candidates_;
   std::vector<std::vector<int>> sums_;
 };
 
-cv::Mat labelWith(PixelLabeling& labeling, const PlaneScene& scene,
-                  const PixelLabelingParameters& parameters) {
+cv::Mat labelWith(PixelLabeling& labeling, const PlaneScene& scene, const PixelLabelingParameters& parameters,
+                  const std::vector<FurtherPlanes>& further = {}) {
   cv::Mat result(scene.labels.size(), CV_32FC1, cv::Scalar(-77));
   labeling.compute(scene.measured, scene.gray, scene.range, scene.segments, scene.graph, scene.planes,
-                   parameters, result);
+                   further, parameters, result);
   return result;
 }
 
-cv::Mat label(const PlaneScene& scene, const PixelLabelingParameters& parameters = {}) {
+cv::Mat label(const PlaneScene& scene, const PixelLabelingParameters& parameters = {},
+              const std::vector<FurtherPlanes>& further = {}) {
   PixelLabeling labeling;
-  return labelWith(labeling, scene, parameters);
+  return labelWith(labeling, scene, parameters, further);
 }
 
 // Blocks as segments, some of label -1, planes and disparities exact in single precision, noise, and holes.
@@ -270,6 +313,7 @@ TEST(PixelLabeling, isTheStraightforwardOne) {
       parameters.edge_reach = 16;
       parameters.edge_step = 0.0;
       parameters.neighbour_cost = parameters.neighbour_cost_in_hole = 100.0;
+      parameters.further_cost = parameters.further_cost_in_hole = 100.0;
       parameters.measured_cost = parameters.visibility_cost = 100.0;
       parameters.smoothness = 0.9375;
       parameters.step_truncation = 16.0;
@@ -282,6 +326,8 @@ TEST(PixelLabeling, isTheStraightforwardOne) {
       parameters.edge_step = random.uniform(0.0, 6.0);
       parameters.neighbour_cost = random.uniform(0.0, 2.0);
       parameters.neighbour_cost_in_hole = random.uniform(0.0, 2.0);
+      parameters.further_cost = random.uniform(0.0, 2.0);
+      parameters.further_cost_in_hole = random.uniform(0.0, 2.0);
       parameters.measured_cost = random.uniform(0.0, 2.0);
       parameters.visibility_cost = random.uniform(0.0, 2.0);
       parameters.smoothness = random.uniform(0.0, 3.5);
@@ -289,8 +335,13 @@ TEST(PixelLabeling, isTheStraightforwardOne) {
       parameters.soft_reach = random.uniform(0.0, 8.0);
       parameters.half_cost = random.uniform(0.1, 4.0);
     }
-    const cv::Mat result = labelWith(labeling, scene, parameters);
-    const cv::Mat expected = Straightforward(scene, parameters).compute();
+    // Other segmentations: those of other scenes.
+    std::vector<PlaneScene> others;
+    for (int i = 0; i < trial % 4; ++i) others.push_back(randomScene(random, size, ranges[trial % 4]));
+    std::vector<FurtherPlanes> further;
+    for (const PlaneScene& other : others) further.push_back({&other.labels, &other.planes});
+    const cv::Mat result = labelWith(labeling, scene, parameters, further);
+    const cv::Mat expected = Straightforward(scene, further, parameters).compute();
     // Means of 8 values in single precision.
     const float tolerance = 2e-6F * (scene.range.max - scene.range.min) + 1e-5F;
     for (int y = 0; y < size.height; ++y) {
@@ -499,16 +550,45 @@ TEST(PixelLabeling, takesNeighboursInTheOrderOfTheLengthOfTheirBorders) {
   EXPECT_FLOAT_EQ(label(scene, parameters).at<float>(2, 7), (8 * 27.5F - 25.0F) / 7);
 }
 
+TEST(PixelLabeling, takesThePlaneOfAFurtherSegmentation) {
+  // One segment over a depth step, of which the one side was measured; another segmentation has both sides.
+  const DisparityPlane left{0.0, 0.0, 10.0, true}, right{0.0, 0.0, 30.0, true};
+  PlaneScene scene({60, 5});
+  scene.measured.colRange(0, 60).setTo(30.0F);
+  scene.measured.colRange(0, 30).setTo(10.0F);
+  scene.measured.colRange(12, 30).setTo(scene.range.invalid());
+  scene.gray.colRange(30, 60).setTo(200);
+  scene.prepare();
+  scene.planes = {right};
+  cv::Mat labels(scene.labels.size(), CV_32SC1, cv::Scalar(-1));
+  labels.colRange(0, 30).setTo(1);
+  std::vector<DisparityPlane> planes = {{}, left};
+  PixelLabelingParameters parameters;
+  const cv::Mat result = label(scene, parameters, {{&labels, &planes}});
+  for (int x = 0; x < 60; ++x) EXPECT_EQ(result.at<float>(2, x), x < 30 ? 10.0F : 30.0F) << x;
+  // Its cost tells, and where it is unknown or of no segment it is no candidate.
+  parameters.further_cost = parameters.further_cost_in_hole = 100.0;
+  EXPECT_EQ(label(scene, parameters, {{&labels, &planes}}).at<float>(2, 20), 30.0F);
+  parameters = {};
+  planes[1].is_known = false;
+  EXPECT_EQ(label(scene, parameters, {{&labels, &planes}}).at<float>(2, 20), 30.0F);
+  planes[1].is_known = true;
+  labels.setTo(-1);
+  EXPECT_EQ(label(scene, parameters, {{&labels, &planes}}).at<float>(2, 20), 30.0F);
+}
+
 TEST(PixelLabeling, isTheSameForAnyNumberOfThreads) {
   cv::RNG random(5);
   const int threads_before = cv::getNumThreads();
   for (const cv::Size size : {cv::Size(97, 61), cv::Size(3, 50), cv::Size(50, 2), cv::Size(1, 1)}) {
     const PlaneScene scene = randomScene(random, size, {0.0F, 64.0F});
+    const PlaneScene other = randomScene(random, size, {0.0F, 64.0F});
+    const std::vector<FurtherPlanes> further = {{&other.labels, &other.planes}};
     cv::setNumThreads(1);
-    const cv::Mat expected = label(scene);
+    const cv::Mat expected = label(scene, {}, further);
     for (const int threads : {2, 3, 7}) {
       cv::setNumThreads(threads);
-      EXPECT_EQ(cv::norm(label(scene), expected, cv::NORM_INF), 0.0) << threads;
+      EXPECT_EQ(cv::norm(label(scene, {}, further), expected, cv::NORM_INF), 0.0) << threads;
     }
   }
   cv::setNumThreads(threads_before);

@@ -320,9 +320,46 @@ TEST(QualityRefinement, labelsPixelsAsPixelLabelingDoes) {
   segments.build(frame.labels);
   SegmentGraph graph;
   graph.build(frame.labels, frame.gray, segments.size(), 17.0);
-  PixelLabeling().compute(measured, frame.gray, RANGE, segments, graph, refinement.planes(),
+  PixelLabeling().compute(measured, frame.gray, RANGE, segments, graph, refinement.planes(), {},
                           parameters.labeling, expected);
   expectSameBits(refined, expected);
+}
+
+TEST(QualityRefinement, takesThePlanesOfFurtherSegmentations) {
+  // The image has random segments, which blocks of labels are not.
+  const Frame frame = randomFrame({97, 61}, 5);
+  QualityParameters parameters;
+  parameters.medians = 0;
+  parameters.further.resize(2);
+  parameters.further[0].lambda = 10;
+  parameters.further[1].lambda = 40;
+  QualityRefinement refinement;
+  cv::Mat refined;
+  refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, FIT, parameters, refined);
+
+  cv::Mat measured, ignored, expected(frame.labels.size(), CV_32FC1);
+  copyValid(frame.disparity, RANGE, measured);
+  QualityParameters alone = parameters;
+  alone.further.clear();
+  std::vector<cv::Mat> labels(2);
+  std::vector<QualityRefinement> others(2);
+  std::vector<FurtherPlanes> further;
+  for (int i = 0; i < 2; ++i) {
+    Segmentation().compute(frame.gray, parameters.further[i], labels[i]);
+    others[i].refine(frame.disparity, labels[i], frame.gray, RANGE, alone, ignored);
+    further.push_back({&labels[i], &others[i].planes()});
+  }
+  SegmentRuns segments;
+  segments.build(frame.labels);
+  SegmentGraph graph;
+  graph.build(frame.labels, frame.gray, segments.size(), parameters.half_contrast);
+  PixelLabeling().compute(measured, frame.gray, RANGE, segments, graph, refinement.planes(), further,
+                          parameters.labeling, expected);
+  expectSameBits(refined, expected);
+  EXPECT_GT(cv::norm(refined, refine(frame, alone), cv::NORM_INF), 1.0);
+  // Fewer of them in a used object.
+  refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, alone, refined);
+  expectSameBits(refined, refine(frame, alone));
 }
 
 TEST(QualityRefinement, filtersByMedians) {
@@ -722,6 +759,9 @@ TEST(QualityRefinement, validatesEveryParameter) {
   expectCost("labeling.neighbour_cost", [](P& p) -> double& { return p.labeling.neighbour_cost; });
   expectCost("labeling.neighbour_cost_in_hole",
              [](P& p) -> double& { return p.labeling.neighbour_cost_in_hole; });
+  expectCost("labeling.further_cost", [](P& p) -> double& { return p.labeling.further_cost; });
+  expectCost("labeling.further_cost_in_hole",
+             [](P& p) -> double& { return p.labeling.further_cost_in_hole; });
   expectCost("labeling.measured_cost", [](P& p) -> double& { return p.labeling.measured_cost; });
   expectCost("labeling.visibility_cost", [](P& p) -> double& { return p.labeling.visibility_cost; });
   expectCost("labeling.smoothness", [](P& p) -> double& { return p.labeling.smoothness; });
@@ -742,6 +782,13 @@ TEST(QualityRefinement, validatesEveryParameter) {
   expectRefused("labeling.neighbour_cost is 101,", [](P& p) { p.labeling.neighbour_cost = 101.0; });
   expectRefused("labeling.neighbour_cost_in_hole is 101,",
                 [](P& p) { p.labeling.neighbour_cost_in_hole = 101.0; });
+  expectRefused("labeling.further_cost is 101,", [](P& p) { p.labeling.further_cost = 101.0; });
+  expectRefused("labeling.further_cost_in_hole is 101,",
+                [](P& p) { p.labeling.further_cost_in_hole = 101.0; });
+  expectRefused("number of further segmentations is 6, expected at most 5",
+                [](P& p) { p.further.resize(6); });
+  expectRefused("lambda is -1,", [](P& p) { p.further.resize(1), p.further[0].lambda = -1; });
+  expectAccepted([](P& p) { p.further.resize(5); });
   expectRefused("labeling.measured_cost is 101,", [](P& p) { p.labeling.measured_cost = 101.0; });
   expectRefused("labeling.visibility_cost is 101,", [](P& p) { p.labeling.visibility_cost = 101.0; });
   expectRefused("labeling.step_truncation is 16.1,", [](P& p) {

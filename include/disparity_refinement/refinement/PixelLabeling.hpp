@@ -25,6 +25,9 @@ struct PixelLabelingParameters {
   /// Cost of a neighbour's plane, 0...100, where the pixel has a measured disparity and where it has none.
   double neighbour_cost = 1.2;
   double neighbour_cost_in_hole = 0.5;
+  /// The same for the planes of further segmentations.
+  double further_cost = 0.5;
+  double further_cost_in_hole = 0.25;
   /// Cost of keeping the measured disparity, 0...100.
   double measured_cost = 1.5;
   /// Cost of a disparity that leads to a place where the right camera sees something farther, 0...100: what
@@ -42,16 +45,24 @@ struct PixelLabelingParameters {
   double half_cost = 1.5;
 };
 
-/// Chooses the disparity of every pixel among few candidates: the planes of its segment and of the neighbours
-/// with the longest borders, and the measured disparity.
+/// Planes of another segmentation of the same image.
+struct FurtherPlanes {
+  const cv::Mat* labels;                      ///< CV_32SC1; negative labels belong to no segment.
+  const std::vector<DisparityPlane>* planes;  ///< One a label.
+};
+
+/// Chooses the disparity of every pixel among few candidates: the planes of its segment, of the segments of
+/// further segmentations that it is in, and of the neighbours with the longest borders, up to 7 planes in
+/// this order, and the measured disparity.
 ///
 /// The sum of the costs of the pixels and of the steps between them is made small as in semi-global matching,
 /// but with candidates instead of disparities: along four paths, L(p, i) = C(p, i) + min over j of (L(q, j) +
 /// step cost(p, i, q, j)) less the least of them, and the candidate with the least sum of the four wins. The
 /// result is the weighted mean of the winner and the candidates near it.
 ///
-/// Planes of a segment that differ by less than 1/2 px all over it are one candidate, and so is a measured
-/// disparity within 1/2 px of the first plane: many pixels of roads and walls have one candidate only.
+/// Planes that differ by less than 1/2 px are one candidate: neighbours' planes all over the segment, and any
+/// planes on a stretch of a row where no label changes. So is a measured disparity within 1/2 px of the first
+/// plane: many pixels of roads and walls have one candidate only.
 ///
 /// Works in steps of 1/16 px in 16 bits: what is more than 2047 px above the least disparity is cut there.
 /// The same bits for any number of threads. Buffers are kept between frames.
@@ -60,12 +71,13 @@ class PixelLabeling {
   /// @param measured  CV_32FC1 [px]; every pixel is valid or range.invalid().
   /// @param gray      CV_8UC1 of the same size.
   /// @param planes    One a segment.
+  /// @param further   Of the same size; may be empty.
   /// @param result    CV_32FC1 of the same size, allocated; range.invalid() for pixels without candidates.
   ///                  Pixels of no segment keep what was measured.
   void compute(const cv::Mat& measured, const cv::Mat& gray, const DisparityRange& range,
                const SegmentRuns& segments, const SegmentGraph& graph,
-               const std::vector<DisparityPlane>& planes, const PixelLabelingParameters& parameters,
-               cv::Mat& result);
+               const std::vector<DisparityPlane>& planes, const std::vector<FurtherPlanes>& further,
+               const PixelLabelingParameters& parameters, cv::Mat& result);
 
  private:
   // Buffers of a strip.
@@ -78,7 +90,8 @@ class PixelLabeling {
   void findNearest(const cv::Mat& measured, int reach, int strips);
   void findCandidates(const cv::Mat& measured, const DisparityRange& range, const SegmentRuns& segments,
                       const SegmentGraph& graph, const std::vector<DisparityPlane>& planes,
-                      const PixelLabelingParameters& parameters, int label, Strip& strip);
+                      const std::vector<FurtherPlanes>& further, const PixelLabelingParameters& parameters,
+                      int label, Strip& strip);
   void addPaths(const cv::Mat& gray, const PixelLabelingParameters& parameters, int strips);
   void choose(const cv::Mat& measured, const DisparityRange& range, const PixelLabelingParameters& parameters,
               int strips, cv::Mat& result) const;

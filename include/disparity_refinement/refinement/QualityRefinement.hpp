@@ -10,6 +10,7 @@
 #include "disparity_refinement/refinement/PlaneSelection.hpp"
 #include "disparity_refinement/refinement/PlaneSmoothing.hpp"
 #include "disparity_refinement/refinement/SegmentGraph.hpp"
+#include "disparity_refinement/segmentation/Segmentation.hpp"
 
 namespace disparity_refinement {
 
@@ -23,6 +24,9 @@ struct QualityParameters {
   /// disparity differs from it by more than the max_divergence of the fit.
   bool label_pixels = true;
   PixelLabelingParameters labeling;
+  /// Further segmentations of the image, whose planes are candidates of the pixels too; each of them costs
+  /// about as much time as a segmentation and half the refinement. At most 5.
+  std::vector<SegmentationParameters> further;
   /// Times that the result is filtered by the median of 5 x 5 pixels, >= 0.
   int medians = 3;
 };
@@ -56,17 +60,32 @@ class QualityRefinement {
               const QualityParameters& parameters, cv::Mat& refined);
 
   /// Plane of every label of the last refine(): is_known is false where none could be found.
-  const std::vector<DisparityPlane>& planes() const { return planes_; }
+  const std::vector<DisparityPlane>& planes() const { return planes_.chosen; }
   /// The planes that were fitted to the segments, before any of them was exchanged or moved.
-  const std::vector<SegmentPlane>& fittedPlanes() const { return fitting_.planes(); }
+  const std::vector<SegmentPlane>& fittedPlanes() const { return planes_.fitting.planes(); }
 
  private:
+  // A segmentation and its planes.
+  struct Planes {
+    void find(const cv::Mat& measured, const cv::Mat& labels, const cv::Mat& gray,
+              const DisparityRange& range, const PlaneRefinementParameters& fit,
+              const QualityParameters& parameters);
+
+    cv::Mat own_labels;  // Of a further segmentation.
+    PlaneFitting fitting;
+    SegmentGraph graph;
+    std::vector<SegmentSupport> support;
+    std::vector<DisparityPlane> fitted, chosen;
+  };
+
+  void findFurtherPlanes(const cv::Mat& gray, const DisparityRange& range,
+                         const PlaneRefinementParameters& fit, const QualityParameters& parameters);
   void takePlanes(const DisparityRange& range, double max_divergence, cv::Mat& refined) const;
 
-  PlaneFitting fitting_;
-  SegmentGraph graph_;
-  std::vector<SegmentSupport> support_;
-  std::vector<DisparityPlane> fitted_, planes_;
+  Planes planes_;
+  Segmentation segmentation_;
+  std::vector<Planes> further_;
+  std::vector<FurtherPlanes> further_planes_;
   PixelLabeling labeling_;
   cv::Mat measured_, chosen_;
 };
