@@ -1,6 +1,22 @@
 #include "disparity_refinement/refinement/DisparityRefinement.hpp"
 
+#include "disparity_refinement/arguments.hpp"
+
 namespace disparity_refinement {
+
+std::vector<SegmentationParameters> furtherSegmentations(int number) {
+  requireArgument(number >= 0 && number <= MAX_FURTHER_SEGMENTATIONS, "further_segmentations", number,
+                  "0...4");
+  constexpr struct {
+    int lambda, h;
+  } SETTINGS[MAX_FURTHER_SEGMENTATIONS] = {{10, 3}, {80, 15}, {20, 4}, {50, 8}};
+  std::vector<SegmentationParameters> segmentations(number);
+  for (int i = 0; i < number; ++i) {
+    segmentations[i].lambda = SETTINGS[i].lambda;
+    segmentations[i].h = SETTINGS[i].h;
+  }
+  return segmentations;
+}
 
 void validate(const RefinementParameters& parameters) {
   validate(parameters.planes);

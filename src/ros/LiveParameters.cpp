@@ -87,6 +87,7 @@ SegmentationParameters toParameters(SegmentationConfig& config) {
 RefinementParameters toParameters(PlaneRefinementConfig& config) {
   RefinementParameters parameters;
   parameters.mode = static_cast<RefinementMode>(config.refinement_mode);
+  parameters.quality.further = furtherSegmentations(config.further_segmentations);
   PlaneRefinementParameters& planes = parameters.planes;
   planes.inlier_threshold = config.inlier_threshold;
   planes.confidence = config.confidence;

@@ -20,8 +20,7 @@ struct EvaluatedMethod {
   std::string maps;            ///< Folder with FRAME.png, KITTI's 16-bit PNG; empty: the maps are computed.
   StageParameters parameters;  ///< Of a computed method.
   bool is_refined = true;  ///< Of a computed method: with segmentation and refinement, or the matcher alone.
-  QualityParameters
-      quality;  ///< Of a refined method whose `parameters` ask for the refinement beyond the paper.
+  QualityParameters quality;  ///< Of a refined method, instead of that in `parameters`.
 
   bool isComputed() const { return maps.empty(); }
   bool isRefined() const { return isComputed() && is_refined; }

@@ -198,6 +198,7 @@ std::vector<EvaluatedMethod> makeMethods(const StageParameters& base, std::vecto
     }
     method.name = refinedName(method.parameters, variant);
     if (isQuality(method.parameters)) method.name += " quality";
+    method.quality = method.parameters.refinement().quality;
     if (with_ablation) {
       const std::vector<EvaluatedMethod> steps = ablation(method);
       methods.insert(methods.end(), steps.begin(), steps.end());

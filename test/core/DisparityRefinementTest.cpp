@@ -71,6 +71,19 @@ TEST(DisparityRefinement, needsTheImageForQualityOnly) {
       std::invalid_argument);
 }
 
+TEST(DisparityRefinement, hasFurtherSegmentations) {
+  for (int number = 0; number <= MAX_FURTHER_SEGMENTATIONS; ++number) {
+    RefinementParameters parameters;
+    parameters.quality.further = furtherSegmentations(number);
+    EXPECT_EQ(parameters.quality.further.size(), static_cast<std::size_t>(number));
+    EXPECT_NO_THROW(validate(parameters));
+  }
+  EXPECT_EQ(furtherSegmentations(2)[1].lambda, 80);
+  EXPECT_EQ(furtherSegmentations(2)[1].h, 15);
+  EXPECT_THROW(furtherSegmentations(-1), std::invalid_argument);
+  EXPECT_THROW(furtherSegmentations(MAX_FURTHER_SEGMENTATIONS + 1), std::invalid_argument);
+}
+
 TEST(DisparityRefinement, validatesBothSetsOfParameters) {
   RefinementParameters parameters;
   EXPECT_NO_THROW(validate(parameters));

@@ -346,7 +346,7 @@ TEST(QualityRefinement, takesThePlanesOfFurtherSegmentations) {
   std::vector<FurtherPlanes> further;
   for (int i = 0; i < 2; ++i) {
     Segmentation().compute(frame.gray, parameters.further[i], labels[i]);
-    others[i].refine(frame.disparity, labels[i], frame.gray, RANGE, alone, ignored);
+    others[i].refine(frame.disparity, labels[i], frame.gray, RANGE, FIT, alone, ignored);
     further.push_back({&labels[i], &others[i].planes()});
   }
   SegmentRuns segments;
@@ -358,7 +358,7 @@ TEST(QualityRefinement, takesThePlanesOfFurtherSegmentations) {
   expectSameBits(refined, expected);
   EXPECT_GT(cv::norm(refined, refine(frame, alone), cv::NORM_INF), 1.0);
   // Fewer of them in a used object.
-  refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, alone, refined);
+  refinement.refine(frame.disparity, frame.labels, frame.gray, RANGE, FIT, alone, refined);
   expectSameBits(refined, refine(frame, alone));
 }
 

@@ -31,7 +31,7 @@ TEST(StageParameters, setsEachTypeByItsName) {
   EXPECT_EQ(parameters.segmentation().gradient.shadow_gamma, 0.5);
   EXPECT_EQ(std::get<int>(parameters.values().at("h")), 7);
   EXPECT_EQ(parameters.values().size(),
-            parameters.matchingValues().size() + 7 /* segmentation */ + 13 /* refinement */);
+            parameters.matchingValues().size() + 7 /* segmentation */ + 14 /* refinement */);
 }
 
 TEST(StageParameters, haveTheModesOfTheLaunchFiles) {

@@ -143,6 +143,12 @@ TEST_F(Tools, evaluateRefinesBeyondThePaper) {
     EXPECT_NE(json.find("\"name\": \"" + name + "\""), std::string::npos) << name;
   }
 
+  // One more step, with it and without.
+  const Outcome further = run("evaluate " + settings + " --ablation --further_segmentations 1");
+  EXPECT_EQ(further.exit_code, 0) << further.text;
+  EXPECT_NE(further.text.find("\n+ further segmentations "), std::string::npos) << further.text;
+  EXPECT_NE(further.text.find("\nall without further segmentations "), std::string::npos) << further.text;
+
   // There are no holes.
   expectGood("evaluate " + settings + " --variant h=5 --write-maps " + out("maps"));
   const cv::Mat map = cv::imread(out("maps/SGBM_3WAY_+_h=5_quality/000000_10.png"), cv::IMREAD_UNCHANGED);

@@ -7,11 +7,19 @@
 #include "disparity_refinement/refinement/PlaneRefinement.hpp"
 #include "disparity_refinement/refinement/PlaneRefinementParameters.hpp"
 #include "disparity_refinement/refinement/QualityRefinement.hpp"
+#include "disparity_refinement/segmentation/Segmentation.hpp"
 
 namespace disparity_refinement {
 
 /// Which refinement is made: the paper's (PlaneRefinement), or the one beyond it (QualityRefinement).
 enum class RefinementMode { PAPER = 0, QUALITY = 1 };
+
+/// The first of those segmentations whose planes help most beside one with (lambda, h) near (30, 3): finer
+/// and coarser ones in turn.
+///
+/// @param number  0...MAX_FURTHER_SEGMENTATIONS
+std::vector<SegmentationParameters> furtherSegmentations(int number);
+constexpr int MAX_FURTHER_SEGMENTATIONS = 4;
 
 struct RefinementParameters {
   RefinementMode mode = RefinementMode::PAPER;
