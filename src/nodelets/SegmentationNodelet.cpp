@@ -41,28 +41,18 @@ class SegmentationNodelet : public LazyNodelet {
     });
     parameters_ = std::make_unique<LiveParameters<SegmentationConfig>>(private_nh);
     queue_size_ = std::max(1, private_nh.param("queue_size", 5));
-    segmentation_ = std::make_unique<Segmentation>(
-        startValue("segmentation_threads", 1, 1, FilteredWatershed::MAX_STRIPS));
-    // It is done long before the matching, whose threads wait for each other: better it waits than they.
-    constexpr int NICENESS = 5;
-    const int niceness = startValue("segmentation_niceness", NICENESS, 0, 19);
+    const int asked = private_nh.param("segmentation_threads", 1);
+    const int threads = std::clamp(asked, 1, FilteredWatershed::MAX_STRIPS);
+    if (threads != asked) {
+      NODELET_WARN_STREAM(private_nh.resolveName("segmentation_threads")
+                          << " is " << asked << ", which is out of range: using " << threads);
+    }
+    segmentation_ = std::make_unique<Segmentation>(threads);
     worker_ = std::make_unique<FrameWorker<sensor_msgs::ImageConstPtr>>(
-        queue_size_, *monitor_, [this](const sensor_msgs::ImageConstPtr& image) { process(image); },
-        niceness);
+        queue_size_, *monitor_, [this](const sensor_msgs::ImageConstPtr& image) { process(image); });
     publisher_ = advertise<sensor_msgs::Image>(nh, "labels");
     monitor_->start();
     start();
-  }
-
-  int startValue(const char* name, int default_value, int least, int largest) {
-    const ros::NodeHandle& private_nh = getPrivateNodeHandle();
-    const int asked = private_nh.param(name, default_value);
-    const int value = std::clamp(asked, least, largest);
-    if (value != asked) {
-      NODELET_WARN_STREAM(private_nh.resolveName(name)
-                          << " is " << asked << ", which is out of range: using " << value);
-    }
-    return value;
   }
 
   void updateSubscriptions() override {

@@ -176,7 +176,6 @@ TEST(RefusedStartValue, isReplacedAndReported) {
       {"segmentation/h", "deep", "5"},
       {"segmentation/shadow_enhancement", "3", "1"},
       {"segmentation/segmentation_threads", "100", "64"},
-      {"segmentation/segmentation_niceness", "-5", "0"},
       {"segmentation/shadow_threshold", "999", "255"},
       {"segmentation/shadow_gamma", "0.001", "0.05"},
       {"plane_refinement/refinement_mode", "brilliant", "0"},

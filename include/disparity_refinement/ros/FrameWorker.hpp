@@ -1,7 +1,5 @@
 #pragma once
 
-#include <sys/resource.h>
-
 #include <condition_variable>
 #include <cstddef>
 #include <deque>
@@ -26,13 +24,11 @@ class FrameWorker {
  public:
   using Process = std::function<void(const Frame&)>;
 
-  /// @param niceness  Of the thread, 0...19: a stage that has time leaves the processors to the others.
-  FrameWorker(std::size_t queue_size, StageMonitor& monitor, Process process, int niceness = 0)
-      : queue_size_(queue_size), monitor_(monitor), process_(std::move(process)), thread_([this, niceness] {
-          // On Linux that of the calling thread alone.
-          setpriority(PRIO_PROCESS, 0, niceness);
-          run();
-        }) {}
+  FrameWorker(std::size_t queue_size, StageMonitor& monitor, Process process)
+      : queue_size_(queue_size),
+        monitor_(monitor),
+        process_(std::move(process)),
+        thread_([this] { run(); }) {}
 
   /// Ends after the frame at work.
   ~FrameWorker() {
