@@ -9,8 +9,10 @@
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
+#include "disparity_refinement/arguments.hpp"
 #include "disparity_refinement/refinement/Confidence.hpp"
 #include "disparity_refinement/refinement/DisparityRefinement.hpp"
 #include "disparity_refinement/ros/FrameWorker.hpp"
@@ -31,6 +33,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
   ~PlaneRefinementNodelet() override {
     // First whoever calls this object from another thread.
     stop();
+    patience_timer_.stop();
     disparity_subscriber_.shutdown();
     labels_subscriber_.shutdown();
     image_subscriber_.shutdown();
@@ -72,12 +75,16 @@ class PlaneRefinementNodelet : public LazyNodelet {
         [this](int messages) { unmatched_ += messages; });
     monitor_->addDiagnostics([this](diagnostic_updater::DiagnosticStatusWrapper& status) {
       status.add("messages without a partner of the same stamp", unmatched_);
+      status.add("frames refined without the left image", without_image_.load());
     });
     refined_publisher_ = advertise<Disparity>(nh, "disparity_refined");
     planes_publisher_ = advertise<Planes>(nh, "planes");
     depth_publisher_ = advertise<Image>(nh, "depth");
     source_publisher_ = advertise<Image>(nh, "disparity_source");
     confidence_publisher_ = advertise<Image>(nh, "confidence");
+    const ros::WallDuration patience(0.25);
+    patience_timer_ = private_nh.createWallTimer(
+        patience, [this, patience](const ros::WallTimerEvent&) { image_join_->expire(patience); });
     monitor_->start();
     start();
   }
@@ -98,11 +105,8 @@ class PlaneRefinementNodelet : public LazyNodelet {
     if (parameters_->snapshot().mode == RefinementMode::PAPER) {
       unsubscribeImage();
     } else if (!image_subscriber_.isSubscribed()) {
-      is_image_needed_ = true;
       // Before the labels, which are made of it.
-      image_subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect",
-                                  static_cast<std::uint32_t>(queue_size_),
-                                  [this](const Image::ConstPtr& image) { image_join_->addMessage(image); });
+      subscribeImage();
     }
     if (!disparity_subscriber_) {
       ros::NodeHandle& nh = getNodeHandle();
@@ -113,6 +117,18 @@ class PlaneRefinementNodelet : public LazyNodelet {
       disparity_subscriber_ = nh.subscribe<Disparity>(
           "disparity", queue_size_,
           [this](const Disparity::ConstPtr& disparity) { join_->addFirst(disparity); }, {}, hints);
+    }
+  }
+
+  void subscribeImage() {
+    try {
+      image_subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect",
+                                  static_cast<std::uint32_t>(queue_size_),
+                                  [this](const Image::ConstPtr& image) { image_join_->addMessage(image); });
+      is_image_needed_ = true;
+    } catch (const std::exception& e) {
+      monitor_->error("cannot subscribe to " + getNodeHandle().resolveName("left/image_rect") +
+                      ", refining as in the paper: " + e.what());
     }
   }
 
@@ -137,8 +153,11 @@ class PlaneRefinementNodelet : public LazyNodelet {
     const std::string image_topic = getNodeHandle().resolveName("left/image_rect");
     cv_bridge::CvImageConstPtr gray;
     if (parameters.mode == RefinementMode::QUALITY) {
-      gray = grayOf(frame, image_topic);
-      if (!gray) parameters.mode = RefinementMode::PAPER;
+      gray = grayOf(frame, disparity.size(), image_topic);
+      if (!gray) {
+        parameters.mode = RefinementMode::PAPER;
+        ++without_image_;
+      }
     }
     const StereoGeometry geometry = disparityGeometry(in, disparity_topic);
     const DisparityRange range = disparityRange(in, disparity_topic);
@@ -152,8 +171,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
       refinement_.refine(disparity, labels, gray ? gray->image : cv::Mat(), range,
                          geometry.focal_length * geometry.baseline, parameters, refined);
     } catch (const std::invalid_argument& e) {
-      throw std::invalid_argument(disparity_topic + ", " + labels_topic + (gray ? ", " + image_topic : "") +
-                                  ": " + e.what());
+      throw std::invalid_argument(disparity_topic + ", " + labels_topic + ": " + e.what());
     }
     monitor_->published(stamp, (ros::WallTime::now() - begin).toSec() * 1e3);
     monitor_->tracePublished("disparity_refined", stamp, message->image.data.data());
@@ -187,21 +205,27 @@ class PlaneRefinementNodelet : public LazyNodelet {
     confidence_publisher_.publish(message);
   }
 
-  /// Null, with a warning, where the refinement has to do without: a good frame is worth more than the best
-  /// refinement.
-  cv_bridge::CvImageConstPtr grayOf(const Frame& frame, const std::string& topic) {
-    if (frame.image) {
-      without_image_ = 0;
-      monitor_->traceReceived("left/image_rect", frame.image->header.stamp, frame.image->data.data());
-      return grayImage(frame.image, topic);
+  /// Null, with a warning or an error, where the refinement has to do without: a good frame is worth more
+  /// than the best refinement.
+  cv_bridge::CvImageConstPtr grayOf(const Frame& frame, const cv::Size& size, const std::string& topic) {
+    if (!frame.image) {
+      // When the mode or a listener has just changed, frames are under way without.
+      if (without_image_ >= queue_size_) {
+        monitor_->warning("no image on " + topic +
+                          " with the stamp of the disparity map: refined as in the paper, expected the left "
+                          "image for refinement_mode Quality");
+      }
+      return nullptr;
     }
-    // When the mode or a listener has just changed, frames are under way without.
-    if (++without_image_ > queue_size_) {
-      monitor_->warning("no image on " + topic +
-                        " with the stamp of the disparity map: refined as in the paper, expected the left "
-                        "image for refinement_mode Quality");
+    monitor_->traceReceived("left/image_rect", frame.image->header.stamp, frame.image->data.data());
+    try {
+      const cv_bridge::CvImageConstPtr gray = grayImage(frame.image, topic);
+      requireImage(gray->image, topic.c_str(), CV_8UC1, size);
+      return gray;
+    } catch (const std::exception& e) {
+      monitor_->error(std::string(e.what()) + "; refined as in the paper");
+      return nullptr;
     }
-    return nullptr;
   }
 
   /// The window of a foreign publisher, cut to the image; the whole image if nothing is left.
@@ -223,7 +247,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
   DisparityRefinement refinement_;
   int queue_size_ = 5;
   std::atomic<bool> is_image_needed_{false};
-  int without_image_ = 0;  // Frames in a row that needed one.
+  std::atomic<long> without_image_{0};  // Frames that needed one.
   long unmatched_ = 0;
   ros::Publisher refined_publisher_, planes_publisher_, depth_publisher_, source_publisher_,
       confidence_publisher_;
@@ -231,6 +255,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
   std::unique_ptr<StampJoin<Disparity, Image>> join_;
   ros::Subscriber disparity_subscriber_, labels_subscriber_;
   ImageSubscriber image_subscriber_;
+  ros::WallTimer patience_timer_;
   std::unique_ptr<FrameWorker<Frame>> worker_;
 };
 

@@ -61,9 +61,21 @@ void findSources(const cv::Mat& disparity, const cv::Mat& refined, const cv::Mat
 
 void findConfidence(const cv::Mat& sources, cv::Mat& confidence) {
   requireImage(sources, "sources", CV_8UC1);
-  const cv::Mat is_measured = sources == static_cast<int>(DisparitySource::MEASURED);
-  cv::blur(is_measured, confidence, {CONFIDENCE_WINDOW, CONFIDENCE_WINDOW}, {-1, -1}, cv::BORDER_REPLICATE);
-  confidence.setTo(0, sources == static_cast<int>(DisparitySource::NONE));
+  confidence.create(sources.size(), CV_8UC1);
+  const auto forEachPixel = [&](const auto& visit) {
+    for (int y = 0; y < sources.rows; ++y) {
+      const auto* source = sources.ptr<std::uint8_t>(y);
+      auto* value = confidence.ptr<std::uint8_t>(y);
+      for (int x = 0; x < sources.cols; ++x) visit(static_cast<DisparitySource>(source[x]), value[x]);
+    }
+  };
+  forEachPixel([](DisparitySource source, std::uint8_t& value) {
+    value = source == DisparitySource::MEASURED ? 255 : 0;
+  });
+  cv::blur(confidence, confidence, {CONFIDENCE_WINDOW, CONFIDENCE_WINDOW}, {-1, -1}, cv::BORDER_REPLICATE);
+  forEachPixel([](DisparitySource source, std::uint8_t& value) {
+    if (source == DisparitySource::NONE) value = 0;
+  });
 }
 
 }  // namespace disparity_refinement

@@ -3,6 +3,7 @@
 #include <XmlRpcValue.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <limits>
 
 namespace disparity_refinement {
@@ -24,15 +25,19 @@ double toNumber(XmlRpc::XmlRpcValue value) {
   }
 }
 
+/// All three have the same parameters in the same order.
 template <class Values>
-void warnAboutRefused(const ros::NodeHandle& private_nh, const Values& in_force) {
-  for (const auto& parameter : in_force) {
+void warnAboutRefused(const ros::NodeHandle& private_nh, const Values& in_force, const Values& least,
+                      const Values& largest) {
+  for (std::size_t i = 0; i < in_force.size(); ++i) {
+    const auto& parameter = in_force[i];
     XmlRpc::XmlRpcValue asked;
     if (!private_nh.getParam(parameter.name, asked)) continue;
     const double value = static_cast<double>(parameter.value);
     if (toNumber(asked) == value) continue;
     ROS_WARN_STREAM(private_nh.resolveName(parameter.name)
-                    << " is " << asked << ", which is out of range or of the wrong type: using " << value);
+                    << " is " << asked << ", expected a value in " << static_cast<double>(least[i].value)
+                    << "..." << static_cast<double>(largest[i].value) << ": using " << value);
   }
 }
 
@@ -111,10 +116,12 @@ VisualizationConfig toParameters(VisualizationConfig& config) {
   return config;
 }
 
-void warnAboutRefusedValues(const ros::NodeHandle& private_nh, const dynamic_reconfigure::Config& in_force) {
-  warnAboutRefused(private_nh, in_force.bools);
-  warnAboutRefused(private_nh, in_force.ints);
-  warnAboutRefused(private_nh, in_force.doubles);
+void warnAboutRefusedValues(const ros::NodeHandle& private_nh, const dynamic_reconfigure::Config& in_force,
+                            const dynamic_reconfigure::Config& least,
+                            const dynamic_reconfigure::Config& largest) {
+  warnAboutRefused(private_nh, in_force.bools, least.bools, largest.bools);
+  warnAboutRefused(private_nh, in_force.ints, least.ints, largest.ints);
+  warnAboutRefused(private_nh, in_force.doubles, least.doubles, largest.doubles);
 }
 
 }  // namespace disparity_refinement

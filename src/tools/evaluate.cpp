@@ -200,6 +200,7 @@ std::vector<EvaluatedMethod> makeMethods(const StageParameters& base, std::vecto
     if (isQuality(method.parameters)) method.name += " quality";
     method.quality = method.parameters.refinement().quality;
     if (with_ablation) {
+      if (!isQuality(method.parameters)) throw std::invalid_argument("--ablation is for --mode quality");
       const std::vector<EvaluatedMethod> steps = ablation(method);
       methods.insert(methods.end(), steps.begin(), steps.end());
     } else {
@@ -259,7 +260,6 @@ void run(int argc, char** argv) {
   base.readOptions(values);
   std::vector<EvaluatedMethod> methods;
   if (maps.empty()) {
-    if (with_ablation && !isQuality(base)) throw std::invalid_argument("--ablation is for --mode quality");
     if (with_ablation && variants.size() > 1) throw std::invalid_argument("--ablation is for one variant");
     methods = makeMethods(base, variants, with_ablation);
     if (!name.empty()) throw std::invalid_argument("--name is for --maps");

@@ -169,6 +169,7 @@ TEST(RefusedStartValue, isReplacedAndReported) {
 
   const struct {
     std::string name, asked, in_force;
+    std::string expected = {};
   } REFUSED[] = {
       {"disparity/stereo_algorithm", "telepathy", "1"},
       {"disparity/correlation_window_size", "8", "9"},
@@ -177,13 +178,13 @@ TEST(RefusedStartValue, isReplacedAndReported) {
       {"segmentation/shadow_enhancement", "3", "1"},
       {"segmentation/segmentation_threads", "100", "64"},
       {"segmentation/shadow_threshold", "999", "255"},
-      {"segmentation/shadow_gamma", "0.001", "0.05"},
-      {"plane_refinement/refinement_mode", "brilliant", "0"},
+      {"segmentation/shadow_gamma", "0.001", "0.05", "expected a value in 0.05...1: "},
+      {"plane_refinement/refinement_mode", "brilliant", "0", "expected a value in 0...1: "},
       {"plane_refinement/max_divergence", "-1.5", "0"},
       {"plane_refinement/min_valid_fraction", "{0.5}", "0.1"},
   };
   for (const auto& value : REFUSED) {
-    const std::string start = "/refused/" + value.name + " is " + value.asked + ", ";
+    const std::string start = "/refused/" + value.name + " is " + value.asked + ", " + value.expected;
     const std::string end = " using " + value.in_force;
     ASSERT_TRUE(log.messages().wait([&](const Log& message) {
       return message.level == Log::WARN && message.msg.compare(0, start.size(), start) == 0 &&
@@ -198,6 +199,7 @@ TEST(RefusedStartValue, isReplacedAndReported) {
   in_force.segmentation.lambda = 0;
   in_force.segmentation.gradient.shadow_threshold = 255;
   in_force.segmentation.gradient.shadow_gamma = 0.05;
+  in_force.matching.full_width = false;
   in_force.refinement.mode = RefinementMode::PAPER;
   in_force.refinement.planes.max_divergence = 0.0;
   chain.expectCore(in_force);

@@ -77,6 +77,16 @@ TEST_F(OptionalJoinTest, joinsAcrossAJumpBack) {
   EXPECT_EQ(emitted_, (Texts{"5 late", "1 early"}));
 }
 
+TEST_F(OptionalJoinTest, letsNoFrameWaitForLongerThanThePatience) {
+  addFrame(1, "1");
+  join_.expire(ros::WallDuration(3600.0));
+  EXPECT_TRUE(emitted_.empty());
+  join_.expire(ros::WallDuration(-1.0));
+  EXPECT_EQ(emitted_, (Texts{"1"}));
+  join_.expire(ros::WallDuration(-1.0));
+  EXPECT_EQ(emitted_, (Texts{"1"}));
+}
+
 TEST_F(OptionalJoinTest, losesNoFrameWhenItIsFlushed) {
   addMessage(2, "b");
   addFrame(1, "1");

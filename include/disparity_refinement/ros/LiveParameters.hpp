@@ -41,9 +41,11 @@ void replaceNan(Config& config) {
   config.__fromMessage__(values);
 }
 
-/// Warns about every start value on the parameter server that is not the one in force: out of range, or of
-/// another type.
-void warnAboutRefusedValues(const ros::NodeHandle& private_nh, const dynamic_reconfigure::Config& in_force);
+/// Warns about every start value on the parameter server that is not the one in force: out of the range from
+/// `least` to `largest`, or of another type.
+void warnAboutRefusedValues(const ros::NodeHandle& private_nh, const dynamic_reconfigure::Config& in_force,
+                            const dynamic_reconfigure::Config& least,
+                            const dynamic_reconfigure::Config& largest);
 
 /// The parameters of one nodelet, live through dynamic_reconfigure on its private handle. A frame takes one
 /// snapshot.
@@ -61,9 +63,11 @@ class LiveParameters {
     start.__clamp__();
     replaceNan(start);
     toParameters(start);
-    dynamic_reconfigure::Config in_force;
+    dynamic_reconfigure::Config in_force, least, largest;
     start.__toMessage__(in_force);
-    warnAboutRefusedValues(private_nh, in_force);
+    Config::__getMin__().__toMessage__(least);
+    Config::__getMax__().__toMessage__(largest);
+    warnAboutRefusedValues(private_nh, in_force, least, largest);
 
     server_.reset(new dynamic_reconfigure::Server<Config>(server_mutex_, private_nh));
     // Calls back at once.

@@ -14,8 +14,8 @@
 namespace disparity_refinement {
 
 /// Gives every frame the message with its stamp of another stream, which may fail: a frame whose message is
-/// not there waits for it until the next frame comes, and then goes on without. So no frame is lost, and they
-/// keep their order.
+/// not there waits for it until the next frame comes or expire() finds it too old, and then goes on without.
+/// So no frame is lost, and they keep their order.
 ///
 /// Up to `capacity` messages are kept in order of arrival, which alone decides what is old: see StampJoin.
 /// Any number of threads may call.
@@ -31,7 +31,7 @@ class OptionalJoin {
   void addFrame(const ros::Time& stamp, const Frame& frame) {
     const std::lock_guard<std::mutex> lock(mutex_);
     release(nullptr);
-    waiting_ = Waiting{stamp, frame};
+    waiting_ = Waiting{stamp, ros::WallTime::now(), frame};
     const auto found =
         std::find_if(messages_.rbegin(), messages_.rend(),
                      [&stamp](const MessagePtr& message) { return message->header.stamp == stamp; });
@@ -51,6 +51,12 @@ class OptionalJoin {
     if (messages_.size() > capacity_) messages_.pop_front();
   }
 
+  /// Ends a wait that is longer than `patience`. To be called now and then.
+  void expire(const ros::WallDuration& patience) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (waiting_ && ros::WallTime::now() - waiting_->since > patience) release(nullptr);
+  }
+
   /// Ends the wait and forgets the messages: none will come any more.
   void flush() {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -61,6 +67,7 @@ class OptionalJoin {
  private:
   struct Waiting {
     ros::Time stamp;
+    ros::WallTime since;
     Frame frame;
   };
 
