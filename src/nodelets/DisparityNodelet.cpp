@@ -35,18 +35,21 @@ class DisparityNodelet : public LazyNodelet {
     ros::NodeHandle& private_nh = getPrivateNodeHandle();
     monitor_ = std::make_unique<StageMonitor>(getName(), nh, private_nh);
     parameters_ = std::make_unique<LiveParameters<DisparityConfig>>(private_nh);
-    const auto queue_size = static_cast<std::size_t>(std::max(1, private_nh.param("queue_size", 5)));
+    const auto queue_size = static_cast<std::size_t>(std::max(1, private_nh.param("queue_size", 1)));
     worker_ = std::make_unique<FrameWorker<StereoFrame>>(
         queue_size, *monitor_, [this](const StereoFrame& frame) { process(frame); });
     subscriber_ = std::make_unique<StereoSubscriber>(
         nh, private_nh, *monitor_, [this](const StereoFrame& frame) { worker_->push(frame); });
     publisher_ = advertise<stereo_msgs::DisparityImage>(nh, "disparity");
+    parameters_publisher_ = nh.advertise<FrameParameters>("disparity_parameters", PUBLISHER_QUEUE_SIZE);
     monitor_->start();
     start();
   }
 
   void updateSubscriptions() override {
-    if (!isWanted(publisher_)) {
+    const bool is_wanted = isWanted(publisher_);
+    monitor_->setActive(is_wanted);
+    if (!is_wanted) {
       subscriber_->unsubscribe();
     } else {
       subscriber_->subscribe();
@@ -57,7 +60,8 @@ class DisparityNodelet : public LazyNodelet {
     const ros::WallTime begin = ros::WallTime::now();
     monitor_->traceReceived("left/image_rect", frame.left->header.stamp, frame.left->data.data());
     monitor_->traceReceived("right/image_rect", frame.right->header.stamp, frame.right->data.data());
-    matcher_.setParameters(parameters_->snapshot());
+    const auto snapshot = parameters_->snapshot();
+    matcher_.setParameters(snapshot->parameters);
     warnAboutFrameIds(frame);
 
     const StereoGeometry geometry = geometryOf(frame);
@@ -78,6 +82,8 @@ class DisparityNodelet : public LazyNodelet {
     }
     monitor_->published(message->header.stamp, (ros::WallTime::now() - begin).toSec() * 1e3);
     monitor_->tracePublished("disparity", message->header.stamp, message->image.data.data());
+    // First, so that it is there when the disparity is.
+    publishParameters(parameters_publisher_, message->header, snapshot->message);
     publisher_.publish(message);
   }
 
@@ -114,7 +120,7 @@ class DisparityNodelet : public LazyNodelet {
   std::unique_ptr<LiveParameters<DisparityConfig>> parameters_;
   StereoMatcher matcher_;
   bool warned_about_frame_ids_ = false;
-  ros::Publisher publisher_;
+  ros::Publisher publisher_, parameters_publisher_;
   std::unique_ptr<StereoSubscriber> subscriber_;
   std::unique_ptr<FrameWorker<StereoFrame>> worker_;
 };

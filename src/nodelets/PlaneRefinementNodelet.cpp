@@ -7,7 +7,10 @@
 #include <atomic>
 #include <cmath>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <pluginlib/class_list_macros.hpp>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -15,6 +18,7 @@
 #include "disparity_refinement/arguments.hpp"
 #include "disparity_refinement/refinement/Confidence.hpp"
 #include "disparity_refinement/refinement/DisparityRefinement.hpp"
+#include "disparity_refinement/refinement/RefinementStatistics.hpp"
 #include "disparity_refinement/ros/FrameWorker.hpp"
 #include "disparity_refinement/ros/ImageSubscriber.hpp"
 #include "disparity_refinement/ros/LazyNodelet.hpp"
@@ -22,12 +26,13 @@
 #include "disparity_refinement/ros/Messages.hpp"
 #include "disparity_refinement/ros/OptionalJoin.hpp"
 #include "disparity_refinement/ros/StageMonitor.hpp"
+#include "disparity_refinement/ros/StampCache.hpp"
 #include "disparity_refinement/ros/StampJoin.hpp"
 
 namespace disparity_refinement {
 
-/// disparity, labels, and with refinement_mode Quality left/image_rect -> disparity_refined, planes, depth,
-/// disparity_source, confidence.
+/// disparity, labels, and with refinement_mode Quality left/image_rect -> disparity_refined, planes,
+/// disparity_source, confidence. Planes take disparity_parameters and segmentation_parameters along.
 class PlaneRefinementNodelet : public LazyNodelet {
  public:
   ~PlaneRefinementNodelet() override {
@@ -37,6 +42,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
     disparity_subscriber_.shutdown();
     labels_subscriber_.shutdown();
     image_subscriber_.shutdown();
+    unsubscribeParameters();
     worker_.reset();
     monitor_.reset();
   }
@@ -55,7 +61,8 @@ class PlaneRefinementNodelet : public LazyNodelet {
     ros::NodeHandle& private_nh = getPrivateNodeHandle();
     monitor_ = std::make_unique<StageMonitor>(getName(), nh, private_nh);
     parameters_ = std::make_unique<LiveParameters<PlaneRefinementConfig>>(private_nh, [this] { update(); });
-    queue_size_ = std::max(1, private_nh.param("queue_size", 5));
+    queue_size_ = std::max(1, private_nh.param("queue_size", 1));
+    min_density_ = private_nh.param("diagnostics_min_density", 0.0);
     const auto cache_size = static_cast<std::size_t>(std::max(1, private_nh.param("cache_size", 30)));
     worker_ = std::make_unique<FrameWorker<Frame>>(queue_size_, *monitor_,
                                                    [this](const Frame& frame) { process(frame); });
@@ -72,14 +79,17 @@ class PlaneRefinementNodelet : public LazyNodelet {
           // Nothing to wait for.
           if (!is_image_needed_) image_join_->flush();
         },
-        [this](int messages) { unmatched_ += messages; });
-    monitor_->addDiagnostics([this](diagnostic_updater::DiagnosticStatusWrapper& status) {
-      status.add("messages without a partner of the same stamp", unmatched_);
-      status.add("frames refined without the left image", without_image_.load());
-    });
+        [this](int disparities, int labels) {
+          monitor_->received(disparities);
+          monitor_->dropped(DropReason::NO_PARTNER, disparities);
+          labels_without_disparity_ += labels;
+        });
+    disparity_parameters_ = std::make_unique<StampCache<FrameParameters>>(cache_size);
+    segmentation_parameters_ = std::make_unique<StampCache<FrameParameters>>(cache_size);
+    monitor_->addDiagnostics(
+        [this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnose(status); });
     refined_publisher_ = advertise<Disparity>(nh, "disparity_refined");
     planes_publisher_ = advertise<Planes>(nh, "planes");
-    depth_publisher_ = advertise<Image>(nh, "depth");
     source_publisher_ = advertise<Image>(nh, "disparity_source");
     confidence_publisher_ = advertise<Image>(nh, "confidence");
     const ros::WallDuration patience(0.25);
@@ -91,39 +101,64 @@ class PlaneRefinementNodelet : public LazyNodelet {
 
   void updateSubscriptions() override {
     bool is_wanted = false;
-    for (const ros::Publisher* publisher : {&refined_publisher_, &planes_publisher_, &depth_publisher_,
-                                            &source_publisher_, &confidence_publisher_}) {
+    for (const ros::Publisher* publisher :
+         {&refined_publisher_, &planes_publisher_, &source_publisher_, &confidence_publisher_}) {
       is_wanted = isWanted(*publisher) || is_wanted;
     }
+    monitor_->setActive(is_wanted);
     if (!is_wanted) {
       disparity_subscriber_.shutdown();
       labels_subscriber_.shutdown();
       join_->clear();
       unsubscribeImage();
+      unsubscribeParameters();
       return;
     }
-    if (parameters_->snapshot().mode == RefinementMode::PAPER) {
+    // Before the disparity and the labels, which they come ahead of.
+    if (planes_publisher_.getNumSubscribers() == 0) {
+      unsubscribeParameters();
+    } else if (!disparity_parameters_subscriber_) {
+      subscribeParameters();
+    }
+    if (parameters_->snapshot()->parameters.mode == RefinementMode::PAPER) {
       unsubscribeImage();
     } else if (!image_subscriber_.isSubscribed()) {
       // Before the labels, which are made of it.
       subscribeImage();
     }
     if (!disparity_subscriber_) {
-      ros::NodeHandle& nh = getNodeHandle();
-      const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
-      labels_subscriber_ = nh.subscribe<Image>(
-          "labels", queue_size_, [this](const Image::ConstPtr& labels) { join_->addSecond(labels); }, {},
-          hints);
-      disparity_subscriber_ = nh.subscribe<Disparity>(
-          "disparity", queue_size_,
-          [this](const Disparity::ConstPtr& disparity) { join_->addFirst(disparity); }, {}, hints);
+      labels_subscriber_ =
+          subscribe<Image>("labels", [this](const Image::ConstPtr& labels) { join_->addSecond(labels); });
+      disparity_subscriber_ = subscribe<Disparity>(
+          "disparity", [this](const Disparity::ConstPtr& disparity) { join_->addFirst(disparity); });
     }
+  }
+
+  template <class Message, class Callback>
+  ros::Subscriber subscribe(const std::string& topic, const Callback& callback) {
+    return getNodeHandle().subscribe<Message>(topic, INPUT_QUEUE_SIZE, callback, {},
+                                              ros::TransportHints().tcpNoDelay());
+  }
+
+  void subscribeParameters() {
+    const auto subscribeCache = [this](const std::string& topic, StampCache<FrameParameters>& cache) {
+      return subscribe<FrameParameters>(
+          topic, [&cache](const FrameParameters::ConstPtr& parameters) { cache.add(parameters); });
+    };
+    disparity_parameters_subscriber_ = subscribeCache("disparity_parameters", *disparity_parameters_);
+    segmentation_parameters_subscriber_ =
+        subscribeCache("segmentation_parameters", *segmentation_parameters_);
+  }
+
+  void unsubscribeParameters() {
+    disparity_parameters_subscriber_.shutdown();
+    segmentation_parameters_subscriber_.shutdown();
   }
 
   void subscribeImage() {
     try {
       image_subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect",
-                                  static_cast<std::uint32_t>(queue_size_),
+                                  INPUT_QUEUE_SIZE,
                                   [this](const Image::ConstPtr& image) { image_join_->addMessage(image); });
       is_image_needed_ = true;
     } catch (const std::exception& e) {
@@ -140,7 +175,9 @@ class PlaneRefinementNodelet : public LazyNodelet {
 
   void process(const Frame& frame) {
     const ros::WallTime begin = ros::WallTime::now();
-    RefinementParameters parameters = parameters_->snapshot();
+    const auto snapshot = parameters_->snapshot();
+    const RefinementParameters* parameters = &snapshot->parameters;
+    RefinementParameters without_image;
     const Disparity& in = *frame.disparity;
     const ros::Time& stamp = in.header.stamp;
     monitor_->traceReceived("disparity", stamp, in.image.data.data());
@@ -152,10 +189,12 @@ class PlaneRefinementNodelet : public LazyNodelet {
     const cv::Mat labels = imageView(*frame.labels, sensor_msgs::image_encodings::TYPE_32SC1, labels_topic);
     const std::string image_topic = getNodeHandle().resolveName("left/image_rect");
     cv_bridge::CvImageConstPtr gray;
-    if (parameters.mode == RefinementMode::QUALITY) {
+    if (parameters->mode == RefinementMode::QUALITY) {
       gray = grayOf(frame, disparity.size(), image_topic);
       if (!gray) {
-        parameters.mode = RefinementMode::PAPER;
+        without_image = *parameters;
+        without_image.mode = RefinementMode::PAPER;
+        parameters = &without_image;
         ++without_image_;
       }
     }
@@ -167,9 +206,10 @@ class PlaneRefinementNodelet : public LazyNodelet {
     if (in.delta_d > 0.0F && std::isfinite(in.delta_d)) message->delta_d = in.delta_d;
     cv::Mat refined =
         imageView(message->image, sensor_msgs::image_encodings::TYPE_32FC1, "disparity_refined");
+    const double focal_length_times_baseline = geometry.focal_length * geometry.baseline;
     try {
       refinement_.refine(disparity, labels, gray ? gray->image : cv::Mat(), range,
-                         geometry.focal_length * geometry.baseline, parameters, refined);
+                         focal_length_times_baseline, *parameters, refined);
     } catch (const std::invalid_argument& e) {
       throw std::invalid_argument(disparity_topic + ", " + labels_topic + ": " + e.what());
     }
@@ -177,12 +217,63 @@ class PlaneRefinementNodelet : public LazyNodelet {
     monitor_->tracePublished("disparity_refined", stamp, message->image.data.data());
     refined_publisher_.publish(message);
     if (planes_publisher_.getNumSubscribers() > 0) {
-      planes_publisher_.publish(planesMessage(in.header, refinement_.planes()));
-    }
-    if (depth_publisher_.getNumSubscribers() > 0) {
-      depth_publisher_.publish(depthImage(in.header, refined, range, geometry));
+      publishPlanes(in.header, snapshot->message, parameters->mode);
     }
     publishConfidence(in.header, disparity, refined, labels, range);
+    if (is_statistics_due_.exchange(false)) {
+      const RefinementStatistics statistics =
+          measureRefinement(disparity, refined, labels, range, focal_length_times_baseline, *parameters,
+                            refinement_.fittedPlanes());
+      const std::lock_guard<std::mutex> lock(statistics_mutex_);
+      statistics_ = statistics;
+    }
+  }
+
+  void publishPlanes(const std_msgs::Header& header, const dynamic_reconfigure::Config& parameters,
+                     RefinementMode mode) {
+    const PlanesPtr message = planesMessage(header, refinement_.planes());
+    const auto copyOf = [&header](const StampCache<FrameParameters>& cache) {
+      const FrameParameters::ConstPtr found = cache.find(header.stamp);
+      return found ? found->parameters : dynamic_reconfigure::Config();
+    };
+    message->disparity_parameters = copyOf(*disparity_parameters_);
+    message->segmentation_parameters = copyOf(*segmentation_parameters_);
+    message->refinement_parameters = parameters;
+    for (dynamic_reconfigure::IntParameter& parameter : message->refinement_parameters.ints) {
+      if (parameter.name == "refinement_mode") parameter.value = static_cast<int>(mode);
+    }
+    planes_publisher_.publish(message);
+  }
+
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+    status.add("labels without a disparity map of their stamp", labels_without_disparity_);
+    status.add("frames refined without the left image", without_image_.load());
+    // Of one frame a second: they take as long as a step of the refinement.
+    is_statistics_due_ = true;
+    std::optional<RefinementStatistics> statistics;
+    {
+      const std::lock_guard<std::mutex> lock(statistics_mutex_);
+      std::swap(statistics, statistics_);
+    }
+    if (!statistics) return;
+    status.add("pixels valid before [%]", 100.0 * statistics->valid_before);
+    status.add("pixels valid after [%]", 100.0 * statistics->valid_after);
+    status.add("segments", statistics->segments);
+    const auto addShare = [&](const char* reason, int segments) {
+      status.add(std::string("segments refused [%], ") + reason,
+                 100.0 * segments / std::max(1, statistics->segments));
+    };
+    addShare("condition 1, depth error", statistics->refused_by_depth_error);
+    addShare("condition 2, too few points", statistics->too_few_points);
+    addShare("condition 3, maximum number of iterations", statistics->max_iterations);
+    addShare("condition 4, divergence", statistics->refused_by_divergence);
+    addShare("no plane through their points", statistics->degenerate);
+    if (statistics->valid_after < min_density_) {
+      std::ostringstream text;
+      text << 100.0 * statistics->valid_after << " % of the pixels have a disparity, expected at least "
+           << 100.0 * min_density_ << " %";
+      status.mergeSummary(diagnostic_msgs::DiagnosticStatus::WARN, text.str());
+    }
   }
 
   void publishConfidence(const std_msgs::Header& header, const cv::Mat& disparity, const cv::Mat& refined,
@@ -245,15 +336,20 @@ class PlaneRefinementNodelet : public LazyNodelet {
   std::unique_ptr<StageMonitor> monitor_;
   std::unique_ptr<LiveParameters<PlaneRefinementConfig>> parameters_;
   DisparityRefinement refinement_;
-  int queue_size_ = 5;
+  int queue_size_ = 1;
+  double min_density_ = 0.0;
   std::atomic<bool> is_image_needed_{false};
   std::atomic<long> without_image_{0};  // Frames that needed one.
-  long unmatched_ = 0;
-  ros::Publisher refined_publisher_, planes_publisher_, depth_publisher_, source_publisher_,
-      confidence_publisher_;
+  long labels_without_disparity_ = 0;
+  std::atomic<bool> is_statistics_due_{true};
+  std::mutex statistics_mutex_;
+  std::optional<RefinementStatistics> statistics_;  // Until they are reported.
+  std::unique_ptr<StampCache<FrameParameters>> disparity_parameters_, segmentation_parameters_;
+  ros::Publisher refined_publisher_, planes_publisher_, source_publisher_, confidence_publisher_;
   std::unique_ptr<OptionalJoin<Frame, Image>> image_join_;
   std::unique_ptr<StampJoin<Disparity, Image>> join_;
-  ros::Subscriber disparity_subscriber_, labels_subscriber_;
+  ros::Subscriber disparity_subscriber_, labels_subscriber_, disparity_parameters_subscriber_,
+      segmentation_parameters_subscriber_;
   ImageSubscriber image_subscriber_;
   ros::WallTimer patience_timer_;
   std::unique_ptr<FrameWorker<Frame>> worker_;

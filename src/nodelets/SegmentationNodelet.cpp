@@ -34,7 +34,8 @@ class SegmentationNodelet : public LazyNodelet {
     ros::NodeHandle& private_nh = getPrivateNodeHandle();
     monitor_ = std::make_unique<StageMonitor>(getName(), nh, private_nh);
     monitor_->addDiagnostics([this](diagnostic_updater::DiagnosticStatusWrapper& status) {
-      const SegmentationParameters parameters = parameters_->snapshot();
+      const auto snapshot = parameters_->snapshot();
+      const SegmentationParameters& parameters = snapshot->parameters;
       status.add("segments", segments_.load());
       status.add("lambda [px]", parameters.lambda);
       status.add("h [gray levels]", parameters.h);
@@ -51,23 +52,26 @@ class SegmentationNodelet : public LazyNodelet {
     worker_ = std::make_unique<FrameWorker<sensor_msgs::ImageConstPtr>>(
         queue_size_, *monitor_, [this](const sensor_msgs::ImageConstPtr& image) { process(image); });
     publisher_ = advertise<sensor_msgs::Image>(nh, "labels");
+    parameters_publisher_ = nh.advertise<FrameParameters>("segmentation_parameters", PUBLISHER_QUEUE_SIZE);
     monitor_->start();
     start();
   }
 
   void updateSubscriptions() override {
-    if (!isWanted(publisher_)) {
+    const bool is_wanted = isWanted(publisher_);
+    monitor_->setActive(is_wanted);
+    if (!is_wanted) {
       subscriber_.shutdown();
     } else if (!subscriber_.isSubscribed()) {
-      subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect",
-                            static_cast<std::uint32_t>(queue_size_),
+      subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect", INPUT_QUEUE_SIZE,
                             [this](const sensor_msgs::ImageConstPtr& image) { worker_->push(image); });
     }
   }
 
   void process(const sensor_msgs::ImageConstPtr& image) {
     const ros::WallTime begin = ros::WallTime::now();
-    const SegmentationParameters parameters = parameters_->snapshot();
+    const auto snapshot = parameters_->snapshot();
+    const SegmentationParameters& parameters = snapshot->parameters;
     monitor_->traceReceived("left/image_rect", image->header.stamp, image->data.data());
     const auto gray = grayImage(image, getNodeHandle().resolveName("left/image_rect"));
 
@@ -79,6 +83,8 @@ class SegmentationNodelet : public LazyNodelet {
                          << " px, h " << parameters.h << ")");
     monitor_->published(message->header.stamp, (ros::WallTime::now() - begin).toSec() * 1e3);
     monitor_->tracePublished("labels", message->header.stamp, message->data.data());
+    // First, so that it is there when the labels are.
+    publishParameters(parameters_publisher_, message->header, snapshot->message);
     publisher_.publish(message);
   }
 
@@ -87,7 +93,7 @@ class SegmentationNodelet : public LazyNodelet {
   std::unique_ptr<Segmentation> segmentation_;
   std::atomic<int> segments_{0};
   int queue_size_ = 5;
-  ros::Publisher publisher_;
+  ros::Publisher publisher_, parameters_publisher_;
   ImageSubscriber subscriber_;
   std::unique_ptr<FrameWorker<sensor_msgs::ImageConstPtr>> worker_;
 };

@@ -58,7 +58,7 @@ class VisualizationNodelet : public LazyNodelet {
         [this](const Image::ConstPtr& image, const Image::ConstPtr& labels) {
           worker_->push([this, image, labels] { drawBorders(image, labels); });
         },
-        [](int) {});
+        [](int, int) {});
     disparity_publisher_ = advertiseImage(*transport_, "disparity_color");
     refined_publisher_ = advertiseImage(*transport_, "disparity_refined_color");
     labels_publisher_ = advertiseImage(*transport_, "labels_color");
@@ -106,7 +106,7 @@ class VisualizationNodelet : public LazyNodelet {
 
   void drawDisparity(const Disparity& message, const std::string& topic,
                      const image_transport::Publisher& publisher) {
-    const VisualizationConfig parameters = parameters_->snapshot();
+    const VisualizationConfig parameters = parameters_->snapshot()->parameters;
     const std::string name = getNodeHandle().resolveName(topic);
     monitor_->traceReceived(topic, message.header.stamp, message.image.data.data());
     const cv::Mat disparity = imageView(message.image, sensor_msgs::image_encodings::TYPE_32FC1, name);

@@ -39,17 +39,12 @@ class Reprojection {
       : range_(range),
         lowest_(std::numeric_limits<float>::lowest()),
         highest_(std::numeric_limits<float>::max()),
-        min_value_(range.min),
+        min_value_(smallestPlaneDisparity(range, focal_length_times_baseline, parameters)),
         max_divergence_(static_cast<float>(parameters.max_divergence)),
         diverging_is_kept_(parameters.divergence_action == DivergenceAction::KEEP) {
     if (parameters.out_of_range_action == OutOfRangeAction::CLAMP) {
       lowest_ = range.min;
       highest_ = range.max;
-    }
-    if (parameters.disparity_error > 0.0) {
-      const double depth_bound =
-          std::sqrt(focal_length_times_baseline * parameters.disparity_error / parameters.max_depth_error);
-      min_value_ = std::max(min_value_, roundedUp(depth_bound));
     }
     if (parameters.divergence_action == DivergenceAction::TAKE_PLANE) {
       max_divergence_ = std::numeric_limits<float>::infinity();
@@ -131,6 +126,14 @@ void validate(const PlaneRefinementParameters& parameters) {
   const auto out_of_range = parameters.out_of_range_action;
   requireArgument(out_of_range == OutOfRangeAction::INVALIDATE || out_of_range == OutOfRangeAction::CLAMP,
                   "out_of_range_action", static_cast<int>(out_of_range), "0 (invalidate) or 1 (clamp)");
+}
+
+float smallestPlaneDisparity(const DisparityRange& range, double focal_length_times_baseline,
+                             const PlaneRefinementParameters& parameters) {
+  if (!(parameters.disparity_error > 0.0)) return range.min;
+  const double depth_bound =
+      std::sqrt(focal_length_times_baseline * parameters.disparity_error / parameters.max_depth_error);
+  return std::max(range.min, roundedUp(depth_bound));
 }
 
 const char* toString(PlaneStatus status) {

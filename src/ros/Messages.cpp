@@ -183,6 +183,15 @@ sensor_msgs::ImagePtr depthImage(const std_msgs::Header& header, const cv::Mat& 
   return message;
 }
 
+void publishParameters(const ros::Publisher& publisher, const std_msgs::Header& header,
+                       const dynamic_reconfigure::Config& parameters) {
+  if (publisher.getNumSubscribers() == 0) return;
+  const auto message = boost::make_shared<FrameParameters>();
+  message->header = header;
+  message->parameters = parameters;
+  publisher.publish(message);
+}
+
 PlanesPtr planesMessage(const std_msgs::Header& header, const std::vector<SegmentPlane>& planes) {
   auto message = boost::make_shared<Planes>();
   message->header = header;

@@ -20,7 +20,7 @@ using ApproximatePolicy =
     message_filters::sync_policies::ApproximateTime<Image, CameraInfo, Image, CameraInfo>;
 
 /// Left and right may run apart by a few messages, however few frames may wait for the stage.
-constexpr int MIN_QUEUE_SIZE = 10;
+constexpr int MIN_QUEUE_SIZE = 30;
 
 }  // namespace
 
@@ -29,7 +29,7 @@ StereoSubscriber::StereoSubscriber(const ros::NodeHandle& nh, const ros::NodeHan
     : nh_(nh), private_nh_(private_nh), monitor_(monitor), callback_(std::move(callback)) {
   approximate_ = private_nh_.param("approximate_sync", false);
   max_interval_ = std::max(1e-6, private_nh_.param("approximate_sync_max_interval", 0.01));
-  queue_size_ = std::max(1, private_nh_.param("queue_size", 5));
+  queue_size_ = std::max(1, private_nh_.param("queue_size", 1));
   warning_period_ = std::max(0.1, private_nh_.param("sync_warning_period", 5.0));
 
   inputs_[LEFT_IMAGE].topic = nh_.resolveName("left/image_rect");
@@ -111,6 +111,7 @@ template <class Message>
 void StereoSubscriber::receive(InputIndex index, const boost::shared_ptr<const Message>& message,
                                message_filters::PassThrough<Message> Synchronizer::*input) {
   const ros::Time& stamp = message->header.stamp;
+  ++inputs_[index].total;
   ++inputs_[index].received;
   Synchronizer& synchronizer = synchronizerFor(index, stamp);
   measureOffset(index, stamp);
@@ -152,8 +153,11 @@ void StereoSubscriber::pair(const sensor_msgs::ImageConstPtr& left,
                             const sensor_msgs::CameraInfoConstPtr& right_info) {
   const auto [first, last] = std::minmax(
       {left->header.stamp, left_info->header.stamp, right->header.stamp, right_info->header.stamp});
+  last_offset_ = (left->header.stamp - right->header.stamp).toSec();
   if (approximate_ && (last - first).toSec() > max_interval_) {
     ++rejected_;
+    monitor_.received();
+    monitor_.dropped(DropReason::TOO_FAR_APART);
     return;
   }
   ++pairs_;
@@ -195,6 +199,11 @@ void StereoSubscriber::checkForPairs() {
 void StereoSubscriber::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   if (!problem_.empty()) status.mergeSummary(diagnostic_msgs::DiagnosticStatus::WARN, problem_);
   status.add("synchronization", approximate_ ? "approximate" : "exact");
+  for (const Input& input : inputs_) status.add("messages on " + input.topic, input.total);
+  if (pairs_ + rejected_ > 0) status.add("left minus right stamp of the last pair [ms]", 1e3 * last_offset_);
+  if (smallest_offset_ >= 0.0) {
+    status.add("smallest distance of left and right stamps since then [ms]", 1e3 * smallest_offset_);
+  }
   status.add("pairs", pairs_);
   status.add("pairs rejected, too far apart", rejected_);
 }

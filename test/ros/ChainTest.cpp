@@ -16,6 +16,7 @@
 namespace disparity_refinement {
 namespace {
 
+using sensor_msgs::CameraInfo;
 using sensor_msgs::Image;
 using stereo_msgs::DisparityImage;
 
@@ -201,6 +202,39 @@ TEST_F(Chain, publishesThePlanesOfTheCore) {
   EXPECT_GT(accepted, 0);
 }
 
+template <class Parameters>
+double valueOf(const Parameters& parameters, const std::string& name) {
+  for (const auto& parameter : parameters) {
+    if (parameter.name == name) return parameter.value;
+  }
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+TEST_F(Chain, planesTakeTheParametersOfTheirFrameAlong) {
+  Listener<Planes> planes(nh_, "planes");
+  ASSERT_TRUE(camera_.waitForChain(planes));
+  const CoreParameters expected = testParameters();
+  int index = 0;
+  for (const int lambda : {40, 20}) {
+    setParameters(lambda, 3);
+    // The first frames may come before planes has subscribed to the parameters too.
+    Planes::ConstPtr message;
+    EXPECT_TRUE(waitFor([&] {
+      message = planes.wait(camera_.publish(index++));
+      return message && !message->disparity_parameters.ints.empty() &&
+             !message->segmentation_parameters.ints.empty();
+    }));
+    ASSERT_TRUE(message);
+    EXPECT_EQ(valueOf(message->segmentation_parameters.ints, "lambda"), lambda);
+    EXPECT_EQ(valueOf(message->segmentation_parameters.ints, "h"), 3);
+    EXPECT_EQ(valueOf(message->disparity_parameters.ints, "disparity_range"), 64);
+    EXPECT_EQ(valueOf(message->disparity_parameters.bools, "full_width"), expected.matching.full_width);
+    EXPECT_EQ(valueOf(message->refinement_parameters.ints, "refinement_mode"),
+              static_cast<int>(expected.refinement.mode));
+    EXPECT_EQ(valueOf(message->refinement_parameters.doubles, "min_valid_fraction"), 0.3);
+  }
+}
+
 TEST_F(Chain, publishesSourceAndConfidenceOfTheCore) {
   Listener<Image> source(nh_, "disparity_source"), confidence(nh_, "confidence");
   ASSERT_TRUE(camera_.waitForChain(source) && camera_.waitForChain(confidence));
@@ -223,13 +257,19 @@ TEST_F(Chain, publishesSourceAndConfidenceOfTheCore) {
   EXPECT_GT(high, 200.0);
 }
 
-TEST_F(Chain, publishesDepthInMetres) {
-  Listener<Image> depth(nh_, "depth");
-  ASSERT_TRUE(camera_.waitForChain(depth));
+TEST_F(Chain, publishesDepthInMetresWithItsCameraInfo) {
+  Listener<Image> depth(nh_, "depth/image_rect");
+  Listener<CameraInfo> info(nh_, "depth/camera_info");
+  ASSERT_TRUE(camera_.waitForChain(depth) && camera_.waitForChain(info));
   const StereoMessages messages = camera_.make(0);
   camera_.publish(messages);
   const auto message = depth.wait(camera_.stamp(0));
-  ASSERT_TRUE(message);
+  const auto info_message = info.wait(camera_.stamp(0));
+  ASSERT_TRUE(message && info_message);
+  EXPECT_EQ(message->header.frame_id, "stereo_left");
+  EXPECT_EQ(info_message->header.frame_id, "stereo_left");
+  EXPECT_EQ(info_message->P, messages.left_info->P);
+  EXPECT_EQ(info_message->width, message->width);
   const CoreResult core = runCore(messages, testParameters());
   const cv::Mat z = imageView(*message, "32FC1", "depth");
   const StreetParameters& street = camera_.street().parameters();

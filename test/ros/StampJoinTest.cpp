@@ -43,7 +43,7 @@ class StampJoinTest : public testing::Test {
                                        matched_.push_back(a->header.stamp.sec);
                                        frames_.emplace_back(a->header.frame_id, b->header.frame_id);
                                      },
-                                     [this](int messages) { dropped_ += messages; }};
+                                     [this](int first, int second) { dropped_ += first + second; }};
 };
 
 TEST_F(StampJoinTest, joinsWhicheverComesFirst) {

@@ -1,64 +1,17 @@
 // Stamps: pairs that never match, pairs that almost match, time that jumps back, and more frames than time.
 
-#include <diagnostic_msgs/DiagnosticArray.h>
 #include <gtest/gtest.h>
 #include <stereo_msgs/DisparityImage.h>
 
-#include <set>
-
 #include "ChainClient.hpp"
+#include "DiagnosticsClient.hpp"
 
 namespace disparity_refinement {
 namespace {
 
-using diagnostic_msgs::DiagnosticArray;
 using diagnostic_msgs::DiagnosticStatus;
 using sensor_msgs::Image;
 using stereo_msgs::DisparityImage;
-
-/// What a nodelet reports on /diagnostics.
-class Diagnostics {
- public:
-  Diagnostics(ros::NodeHandle& nh, const std::string& nodelet)
-      : nodelet_(nodelet), listener_(nh, "/diagnostics") {}
-
-  /// Waits for a report, from now on, for which `matches` holds.
-  bool waitFor(const std::function<bool(const DiagnosticStatus&)>& matches) {
-    listener_.clear();
-    return listener_.wait([&](const DiagnosticArray& array) {
-      return std::any_of(array.status.begin(), array.status.end(), [&](const DiagnosticStatus& status) {
-        return status.name.find(nodelet_) != std::string::npos && matches(status);
-      });
-    }) != nullptr;
-  }
-
-  /// A report of the state from now on: the first that comes may have been under way already.
-  DiagnosticStatus next() {
-    DiagnosticStatus second;
-    std::set<ros::Time> stamps;
-    listener_.clear();
-    listener_.wait([&](const DiagnosticArray& array) {
-      for (const DiagnosticStatus& status : array.status) {
-        if (status.name.find(nodelet_) == std::string::npos) continue;
-        stamps.insert(array.header.stamp);
-        second = status;
-      }
-      return stamps.size() > 1;
-    });
-    return second;
-  }
-
-  static long value(const DiagnosticStatus& status, const std::string& key) {
-    for (const auto& entry : status.values) {
-      if (entry.key == key) return std::stol(entry.value);
-    }
-    return -1;
-  }
-
- private:
-  const std::string nodelet_;
-  Listener<DiagnosticArray> listener_;
-};
 
 /// A chain in a namespace, with a camera in front of it and listeners behind it.
 class Chain {

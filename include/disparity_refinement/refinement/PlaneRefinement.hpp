@@ -9,6 +9,10 @@
 
 namespace disparity_refinement {
 
+/// Smallest value of a plane that may be written: range.min, or the bound of condition 1 if that is larger.
+float smallestPlaneDisparity(const DisparityRange& range, double focal_length_times_baseline,
+                             const PlaneRefinementParameters& parameters);
+
 /// Fits a plane to the disparities of every segment and writes it back where the four conditions of the paper
 /// hold.
 ///

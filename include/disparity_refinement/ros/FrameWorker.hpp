@@ -49,7 +49,7 @@ class FrameWorker {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (queue_.size() >= queue_size_) {
         queue_.pop_front();
-        monitor_.dropped();
+        monitor_.dropped(DropReason::QUEUE_FULL);
       }
       queue_.push_back(std::move(frame));
     }
@@ -69,13 +69,18 @@ class FrameWorker {
         try {
           process_(frame);
         } catch (const std::exception& e) {
-          monitor_.error(e.what());
+          refuse(e.what());
         } catch (...) {
-          monitor_.error("unknown exception");
+          refuse("unknown exception");
         }
       }
       lock.lock();
     }
+  }
+
+  void refuse(const char* reason) {
+    monitor_.error(reason);
+    monitor_.dropped(DropReason::BAD);
   }
 
   const std::size_t queue_size_;

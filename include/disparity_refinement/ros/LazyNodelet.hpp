@@ -16,6 +16,11 @@ namespace disparity_refinement {
 /// the behaviour off.
 class LazyNodelet : public nodelet::Nodelet {
  protected:
+  static constexpr int PUBLISHER_QUEUE_SIZE = 10;
+  /// Messages that may wait for a callback of the nodelet, which hands them on at once: none is lost unseen
+  /// while the manager's thread is late, however few frames may wait for the stage.
+  static constexpr int INPUT_QUEUE_SIZE = 30;
+
   template <class Message>
   ros::Publisher advertise(ros::NodeHandle& nh, const std::string& topic) {
     const ros::SubscriberStatusCallback changed = [this](const ros::SingleSubscriberPublisher&) { update(); };
@@ -51,8 +56,6 @@ class LazyNodelet : public nodelet::Nodelet {
   }
 
  private:
-  static constexpr int PUBLISHER_QUEUE_SIZE = 10;
-
   std::mutex mutex_;
   bool started_ = false;
   bool lazy_ = true;

@@ -52,7 +52,11 @@ void warnAboutRefusedValues(const ros::NodeHandle& private_nh, const dynamic_rec
 template <class Config>
 class LiveParameters {
  public:
-  using Parameters = decltype(toParameters(std::declval<Config&>()));
+  /// One set of values, in both forms.
+  struct Snapshot {
+    decltype(toParameters(std::declval<Config&>())) parameters;
+    dynamic_reconfigure::Config message;  ///< Without groups.
+  };
 
   /// @param changed  Called after every change, by the thread of `private_nh`'s callbacks.
   explicit LiveParameters(
@@ -72,24 +76,29 @@ class LiveParameters {
     server_.reset(new dynamic_reconfigure::Server<Config>(server_mutex_, private_nh));
     // Calls back at once.
     server_->setCallback([this](Config& config, std::uint32_t) {
+      replaceNan(config);
+      const auto snapshot = std::make_shared<Snapshot>();
+      snapshot->parameters = toParameters(config);
+      config.__toMessage__(snapshot->message);
+      snapshot->message.groups.clear();
       {
         const std::lock_guard<std::mutex> lock(mutex_);
-        replaceNan(config);
-        parameters_ = toParameters(config);
+        snapshot_ = snapshot;
       }
       changed_();
     });
   }
 
-  Parameters snapshot() const {
+  /// Never null; it does not change any more.
+  std::shared_ptr<const Snapshot> snapshot() const {
     const std::lock_guard<std::mutex> lock(mutex_);
-    return parameters_;
+    return snapshot_;
   }
 
  private:
   const std::function<void()> changed_;
   mutable std::mutex mutex_;
-  Parameters parameters_;
+  std::shared_ptr<const Snapshot> snapshot_;
   boost::recursive_mutex server_mutex_;
   std::unique_ptr<dynamic_reconfigure::Server<Config>> server_;
 };

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cv_bridge/cv_bridge.h>
+#include <dynamic_reconfigure/Config.h>
+#include <ros/publisher.h>
 #include <sensor_msgs/Image.h>
 #include <stereo_msgs/DisparityImage.h>
 
@@ -9,6 +11,7 @@
 #include <vector>
 
 #include "disparity_refinement/DisparityRange.hpp"
+#include "disparity_refinement/FrameParameters.h"
 #include "disparity_refinement/Planes.h"
 #include "disparity_refinement/refinement/PlaneRefinement.hpp"
 #include "disparity_refinement/ros/StereoGeometry.hpp"
@@ -45,6 +48,11 @@ StereoGeometry disparityGeometry(const stereo_msgs::DisparityImage& message, con
 sensor_msgs::ImagePtr depthImage(const std_msgs::Header& header, const cv::Mat& disparity,
                                  const DisparityRange& range, const StereoGeometry& geometry);
 
+/// Publishes the parameters of one frame if anybody listens.
+void publishParameters(const ros::Publisher& publisher, const std_msgs::Header& header,
+                       const dynamic_reconfigure::Config& parameters);
+
+/// Without parameters.
 PlanesPtr planesMessage(const std_msgs::Header& header, const std::vector<SegmentPlane>& planes);
 
 }  // namespace disparity_refinement

@@ -21,18 +21,22 @@ class StampJoin {
   using APtr = boost::shared_ptr<const A>;
   using BPtr = boost::shared_ptr<const B>;
   using Match = std::function<void(const APtr&, const BPtr&)>;
-  /// Called with the number of messages that were dropped without a partner.
-  using Drop = std::function<void(int)>;
+  /// Called with the number of messages of each stream that were dropped without a partner.
+  using Drop = std::function<void(int, int)>;
 
   StampJoin(std::size_t capacity, Match match, Drop drop)
       : capacity_(capacity), match_(std::move(match)), drop_(std::move(drop)) {}
 
   void addFirst(const APtr& message) {
-    add(message, first_, second_, [this](const APtr& a, const BPtr& b) { match_(a, b); });
+    add(
+        message, first_, second_, [this](const APtr& a, const BPtr& b) { match_(a, b); },
+        [this](int own, int other) { drop_(own, other); });
   }
 
   void addSecond(const BPtr& message) {
-    add(message, second_, first_, [this](const BPtr& b, const APtr& a) { match_(a, b); });
+    add(
+        message, second_, first_, [this](const BPtr& b, const APtr& a) { match_(a, b); },
+        [this](int own, int other) { drop_(other, own); });
   }
 
   void clear() {
@@ -41,8 +45,9 @@ class StampJoin {
   }
 
  private:
-  template <class Own, class Other, class Emit>
-  void add(const Own& message, std::deque<Own>& own, std::deque<Other>& other, const Emit& emit) {
+  template <class Own, class Other, class Emit, class DropBoth>
+  void add(const Own& message, std::deque<Own>& own, std::deque<Other>& other, const Emit& emit,
+           const DropBoth& drop) {
     // The newest of equal stamps: what is left of an earlier loop is older.
     const auto partner = std::find_if(other.rbegin(), other.rend(), [&message](const Other& candidate) {
       return candidate->header.stamp == message->header.stamp;
@@ -51,15 +56,16 @@ class StampJoin {
       own.push_back(message);
       if (own.size() > capacity_) {
         own.pop_front();
-        drop_(1);
+        drop(1, 0);
       }
       return;
     }
     const Other found = *partner;
-    const auto overtaken = std::distance(other.begin(), partner.base()) - 1 + static_cast<long>(own.size());
+    const auto overtaken = static_cast<int>(std::distance(other.begin(), partner.base()) - 1);
+    const auto overtaken_own = static_cast<int>(own.size());
     other.erase(other.begin(), partner.base());
     own.clear();
-    if (overtaken > 0) drop_(static_cast<int>(overtaken));
+    if (overtaken_own + overtaken > 0) drop(overtaken_own, overtaken);
     emit(message, found);
   }
 

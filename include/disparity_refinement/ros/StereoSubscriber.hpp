@@ -24,7 +24,7 @@ struct StereoFrame {
 /// Synchronizes left/image_rect, left/camera_info, right/image_rect and right/camera_info.
 ///
 /// Parameters on the private handle: ~approximate_sync (false), ~approximate_sync_max_interval [s] (0.01),
-/// ~queue_size [frames] (5), ~sync_warning_period [s] (5), ~image_transport (raw).
+/// ~queue_size [frames] (1), ~sync_warning_period [s] (5), ~image_transport (raw).
 ///
 /// - Approximate pairs farther apart than the interval are rejected and counted. The same interval tells the
 /// policy how
@@ -59,6 +59,7 @@ class StereoSubscriber {
   struct Input {
     std::string topic;
     ros::Time last;         ///< Stamp of the newest message.
+    long total = 0;         ///< Messages.
     long received = 0;      ///< Messages since the last pair or warning.
     bool settling = false;  ///< Another topic jumped back in time, this one has not yet.
   };
@@ -95,7 +96,8 @@ class StereoSubscriber {
   ros::Time jump_from_, jump_to_;
   double smallest_offset_ = -1.0;  ///< Between left and right images since the last pair [s], -1: unknown.
   long pairs_ = 0, pairs_at_last_check_ = 0, rejected_ = 0;
-  std::string problem_;  ///< What the last warning said, empty after a pair.
+  double last_offset_ = 0.0;  ///< Left minus right image of the last pair, also of a rejected one [s].
+  std::string problem_;       ///< What the last warning said, empty after a pair.
 
   bool subscribed_ = false;
   ImageSubscriber left_, right_;
