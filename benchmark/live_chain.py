@@ -78,15 +78,15 @@ def free_port():
         return listener.getsockname()[1]
 
 
-def launch(nodelets, bag, input_rate, frames, folder):
-    """What probe_manager has written while the bag was played."""
+def launch(nodelets, bag, input_rate, frames, folder, **more):
+    """What probe_manager has written while that many frames of the bag were played, if need be again and again."""
     output = folder / "times.json"
     if output.exists():
         output.unlink()
     port = free_port()
     log = folder / f"{nodelets}.log"
-    arguments = {"nodelets": nodelets, "bag": bag, "rate": input_rate / BAG_RATE, "duration": frames / BAG_RATE,
-                 "output": output}
+    arguments = {"nodelets": nodelets, "bag": bag, "rate": input_rate / BAG_RATE, "output": output, **more}
+    arguments.update({"duration": frames / BAG_RATE} if frames <= BAG_FRAMES else {"seconds": frames / input_rate})
     command = ["roslaunch", "-p", str(port), str(ROOT / "benchmark/live_chain.launch")]
     command += [f"{name}:={value}" for name, value in arguments.items()]
     with open(log, "w") as text:

@@ -1,6 +1,7 @@
 // A nodelet manager that starts a paused rosbag play when all its nodelets are loaded, and notes when the
 // images of a stereo pair arrive in it and when the disparity maps of its nodelets are published. When
-// nothing has moved for a while it writes them as JSON and ends. Started by live_chain.launch.
+// nothing has moved for a while, or after ~duration, it writes them as JSON and ends. Started by
+// live_chain.launch.
 //
 // The times are those that roscpp stamps on a message that it hands to a subscriber: on arrival from another
 // process, or inside publish() of a nodelet. So the thread that notes them may be late.
@@ -12,6 +13,7 @@
 #include <std_srvs/SetBool.h>
 #include <stereo_msgs/DisparityImage.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <array>
 #include <fstream>
@@ -40,6 +42,12 @@ long peakKilobytes() {
   return usage.ru_maxrss;
 }
 
+long residentKilobytes() {
+  long pages = 0, resident_pages = 0;
+  std::ifstream("/proc/self/statm") >> pages >> resident_pages;
+  return resident_pages * (sysconf(_SC_PAGESIZE) / 1024);
+}
+
 class Probe {
  public:
   explicit Probe(bool with_refinement) : spinner_(1, &queue_) {
@@ -64,7 +72,7 @@ class Probe {
 
   void write(const std::string& file) const {
     const std::lock_guard<std::mutex> lock(mutex_);
-    nlohmann::json frames = nlohmann::json::array();
+    nlohmann::json frames = past_loops_;
     for (const auto& frame : frames_) frames.push_back(frame.second);
     std::ofstream(file) << nlohmann::json{{"frames", frames}, {"peak_kilobytes", peakKilobytes()}};
   }
@@ -78,8 +86,14 @@ class Probe {
       const std::lock_guard<std::mutex> lock(mutex_);
       last_ = ros::WallTime::now();
       auto& frame = frames_[event.getMessage()->header.stamp];
+      if (frame.count(name) > 0) {
+        // The bag is played again.
+        past_loops_.push_back(frame);
+        frame.clear();
+      }
       frame[name] = event.getReceiptTime().toSec();
       frame["processor_time"] = processorTime();
+      frame["resident_kilobytes"] = static_cast<double>(residentKilobytes());
     };
     subscribers_.push_back(nh_.subscribe<Message>(topic, QUEUE, note));
   }
@@ -89,6 +103,7 @@ class Probe {
   std::vector<ros::Subscriber> subscribers_;
   mutable std::mutex mutex_;
   std::map<ros::Time, std::map<std::string, double>> frames_;
+  std::vector<std::map<std::string, double>> past_loops_;
   ros::WallTime last_;
   ros::AsyncSpinner spinner_;
 };
@@ -110,7 +125,10 @@ int main(int argc, char** argv) {
   resume.request.data = 0;
   while (ros::ok() && !ros::service::call(pause, resume)) ros::WallDuration(0.1).sleep();
   constexpr double END_OF_BAG = 2.0;  // [s]
-  while (ros::ok() && probe.silence() < END_OF_BAG) ros::WallDuration(0.1).sleep();
+  const double duration = private_nh.param("duration", 0.0);
+  const ros::WallTime begin = ros::WallTime::now();
+  const auto isOver = [&] { return duration > 0.0 && (ros::WallTime::now() - begin).toSec() > duration; };
+  while (ros::ok() && probe.silence() < END_OF_BAG && !isOver()) ros::WallDuration(0.1).sleep();
   probe.write(private_nh.param<std::string>("output", "live_chain.json"));
   ros::shutdown();
 }

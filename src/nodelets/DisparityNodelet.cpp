@@ -61,6 +61,8 @@ class DisparityNodelet : public LazyNodelet {
     monitor_->traceReceived("left/image_rect", frame.left->header.stamp, frame.left->data.data());
     monitor_->traceReceived("right/image_rect", frame.right->header.stamp, frame.right->data.data());
     const auto snapshot = parameters_->snapshot();
+    // Now, for whoever works for the frames that are matched alone.
+    publishParameters(parameters_publisher_, frame.left->header, snapshot->message);
     matcher_.setParameters(snapshot->parameters);
     warnAboutFrameIds(frame);
 
@@ -82,8 +84,6 @@ class DisparityNodelet : public LazyNodelet {
     }
     monitor_->published(message->header.stamp, (ros::WallTime::now() - begin).toSec() * 1e3);
     monitor_->tracePublished("disparity", message->header.stamp, message->image.data.data());
-    // First, so that it is there when the disparity is.
-    publishParameters(parameters_publisher_, message->header, snapshot->message);
     publisher_.publish(message);
   }
 

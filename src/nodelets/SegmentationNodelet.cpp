@@ -7,6 +7,7 @@
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "disparity_refinement/ros/FrameGate.hpp"
 #include "disparity_refinement/ros/FrameWorker.hpp"
 #include "disparity_refinement/ros/ImageSubscriber.hpp"
 #include "disparity_refinement/ros/LazyNodelet.hpp"
@@ -17,13 +18,15 @@
 
 namespace disparity_refinement {
 
-/// left/image_rect -> labels.
+/// left/image_rect -> labels. Of the frames of disparity_parameters, while there are any.
 class SegmentationNodelet : public LazyNodelet {
  public:
   ~SegmentationNodelet() override {
     // First whoever calls this object from another thread.
     stop();
+    patience_timer_.stop();
     subscriber_.shutdown();
+    announcement_subscriber_.shutdown();
     worker_.reset();
     monitor_.reset();
   }
@@ -51,6 +54,17 @@ class SegmentationNodelet : public LazyNodelet {
     segmentation_ = std::make_unique<Segmentation>(threads);
     worker_ = std::make_unique<FrameWorker<sensor_msgs::ImageConstPtr>>(
         queue_size_, *monitor_, [this](const sensor_msgs::ImageConstPtr& image) { process(image); });
+    is_following_ = private_nh.param("follow_disparity", true);
+    // More than a second without a disparity map: there is no matcher, or one that does not care.
+    gate_ = std::make_unique<FrameGate<sensor_msgs::Image>>(
+        static_cast<std::size_t>(queue_size_ + 2), ros::WallDuration(1.0),
+        [this](const sensor_msgs::ImageConstPtr& image) { worker_->push(image); },
+        [this](int frames) {
+          monitor_->received(frames);
+          monitor_->dropped(DropReason::NO_PARTNER, frames);
+        });
+    patience_timer_ = private_nh.createWallTimer(ros::WallDuration(0.25),
+                                                 [this](const ros::WallTimerEvent&) { gate_->expire(); });
     publisher_ = advertise<sensor_msgs::Image>(nh, "labels");
     parameters_publisher_ = nh.advertise<FrameParameters>("segmentation_parameters", PUBLISHER_QUEUE_SIZE);
     monitor_->start();
@@ -62,9 +76,16 @@ class SegmentationNodelet : public LazyNodelet {
     monitor_->setActive(is_wanted);
     if (!is_wanted) {
       subscriber_.shutdown();
+      announcement_subscriber_.shutdown();
     } else if (!subscriber_.isSubscribed()) {
+      if (is_following_) {
+        announcement_subscriber_ = getNodeHandle().subscribe<FrameParameters>(
+            "disparity_parameters", INPUT_QUEUE_SIZE,
+            [this](const FrameParameters::ConstPtr& begun) { gate_->announce(begun->header.stamp); }, {},
+            ros::TransportHints().tcpNoDelay());
+      }
       subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect", INPUT_QUEUE_SIZE,
-                            [this](const sensor_msgs::ImageConstPtr& image) { worker_->push(image); });
+                            [this](const sensor_msgs::ImageConstPtr& image) { gate_->addFrame(image); });
     }
   }
 
@@ -93,8 +114,12 @@ class SegmentationNodelet : public LazyNodelet {
   std::unique_ptr<Segmentation> segmentation_;
   std::atomic<int> segments_{0};
   int queue_size_ = 5;
+  bool is_following_ = true;
   ros::Publisher publisher_, parameters_publisher_;
+  std::unique_ptr<FrameGate<sensor_msgs::Image>> gate_;
   ImageSubscriber subscriber_;
+  ros::Subscriber announcement_subscriber_;
+  ros::WallTimer patience_timer_;
   std::unique_ptr<FrameWorker<sensor_msgs::ImageConstPtr>> worker_;
 };
 
