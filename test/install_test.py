@@ -143,8 +143,9 @@ for module in (disparity_refinement.msg, disparity_refinement.cfg):
         deadline = time.monotonic() + TIMEOUT
         loaded = ""
         while not all("/stereo/" + name in loaded for name in NODELETS):
-            self.assertIsNone(process.poll(), self.launch_log())
-            self.assertLess(time.monotonic(), deadline, "loaded: %s\n%s" % (loaded, self.launch_log()))
+            log = self.launch_log()
+            self.assertTrue(process.poll() is None and "process has died" not in log, log)
+            self.assertLess(time.monotonic(), deadline, "loaded: %s\n%s" % (loaded, log))
             time.sleep(0.5)
             loaded = self.run_command("rosservice call /stereo/refinement_manager/list 2>&1 || true")
         pid = self.run_command("rosnode info /stereo/refinement_manager | sed -n 's/^Pid: *//p'").strip()
