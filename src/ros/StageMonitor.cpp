@@ -17,7 +17,7 @@ constexpr std::size_t REMEMBERED_TEXTS = 32;
 /// Of a bag that is played without its clock, say [s].
 constexpr double AGE_OF_ANOTHER_CLOCK = 3600.0;
 /// In the order of DropReason.
-constexpr const char* REASON_NAMES[] = {"queue full", "no partner", "stamps too far apart", "bad"};
+constexpr const char* REASON_NAMES[] = {"queue full", "no partner", "bad"};
 
 template <class... Parts>
 std::string join(const Parts&... parts) {

@@ -14,10 +14,9 @@ namespace disparity_refinement {
 
 /// Why a frame that came in is not published.
 enum class DropReason {
-  QUEUE_FULL,     ///< Newer ones came while it waited: too slow.
-  NO_PARTNER,     ///< What it has to be joined with did not come.
-  TOO_FAR_APART,  ///< Left and right, by their stamps.
-  BAD,            ///< It was refused with an error.
+  QUEUE_FULL,  ///< Newer ones came while it waited: too slow.
+  NO_PARTNER,  ///< What it has to be joined with did not come.
+  BAD,         ///< It was refused with an error.
 };
 
 /// Counts what one nodelet does with its frames, logs its errors, and reports both on /diagnostics once a
@@ -56,7 +55,7 @@ class StageMonitor {
   void tracePublished(const std::string& topic, const ros::Time& stamp, const void* data) const;
 
  private:
-  static constexpr std::size_t REASONS = 4;
+  static constexpr std::size_t REASONS = 3;
 
   struct Counts {
     long received = 0, published = 0, errors = 0;
