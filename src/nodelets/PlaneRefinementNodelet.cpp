@@ -158,7 +158,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
   void subscribeImage() {
     try {
       image_subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect",
-                                  INPUT_QUEUE_SIZE,
+                                  INPUT_QUEUE_SIZE, *monitor_,
                                   [this](const Image::ConstPtr& image) { image_join_->addMessage(image); });
       is_image_needed_ = true;
     } catch (const std::exception& e) {
@@ -185,6 +185,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
 
     const std::string disparity_topic = getNodeHandle().resolveName("disparity");
     const std::string labels_topic = getNodeHandle().resolveName("labels");
+    requireTime(in.header, disparity_topic);
     const cv::Mat disparity = imageView(in.image, sensor_msgs::image_encodings::TYPE_32FC1, disparity_topic);
     const cv::Mat labels = imageView(*frame.labels, sensor_msgs::image_encodings::TYPE_32SC1, labels_topic);
     const std::string image_topic = getNodeHandle().resolveName("left/image_rect");

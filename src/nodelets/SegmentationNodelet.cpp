@@ -85,6 +85,7 @@ class SegmentationNodelet : public LazyNodelet {
             ros::TransportHints().tcpNoDelay());
       }
       subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect", INPUT_QUEUE_SIZE,
+                            *monitor_,
                             [this](const sensor_msgs::ImageConstPtr& image) { gate_->addFrame(image); });
     }
   }

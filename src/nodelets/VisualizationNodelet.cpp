@@ -86,7 +86,7 @@ class VisualizationNodelet : public LazyNodelet {
       image_subscriber_.shutdown();
       join_->clear();
     } else if (!image_subscriber_.isSubscribed()) {
-      image_subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect", 1,
+      image_subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect", 1, *monitor_,
                                   [this](const Image::ConstPtr& image) { join_->addFirst(image); });
     }
   }

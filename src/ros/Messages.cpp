@@ -77,6 +77,14 @@ float largestFinite(const cv::Mat& map, float at_least) {
 
 }  // namespace
 
+void requireTime(const std_msgs::Header& header, const std::string& topic) {
+  constexpr std::uint32_t LATEST = std::numeric_limits<std::int32_t>::max();
+  if (header.stamp.isZero() || header.stamp.sec > LATEST) {
+    refuse(topic, "the stamp is ", header.stamp.isZero() ? "0" : "beyond the year 2038",
+           ", expected the time of exposure: the driver has to fill in header.stamp");
+  }
+}
+
 cv_bridge::CvImageConstPtr grayImage(const sensor_msgs::ImageConstPtr& message, const std::string& topic) {
   int bytes_per_pixel = 0;
   try {

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <exception>
 #include <sstream>
 #include <utility>
+
+#include "disparity_refinement/ros/Messages.hpp"
 
 namespace disparity_refinement {
 namespace {
@@ -57,7 +60,7 @@ void StereoSubscriber::subscribe() {
 
 void StereoSubscriber::subscribeImage(InputIndex index, ImageSubscriber& subscriber,
                                       void (StereoJoin::*add)(const sensor_msgs::ImageConstPtr&)) {
-  subscriber.subscribe(nh_, private_nh_, NAMES[index], static_cast<std::uint32_t>(queue_size_),
+  subscriber.subscribe(nh_, private_nh_, NAMES[index], static_cast<std::uint32_t>(queue_size_), monitor_,
                        [this, index, add](const sensor_msgs::ImageConstPtr& image) {
                          note(index, image->header.stamp);
                          (join_.*add)(image);
@@ -69,6 +72,12 @@ ros::Subscriber StereoSubscriber::subscribeInfo(
   return nh_.subscribe<sensor_msgs::CameraInfo>(
       NAMES[index], static_cast<std::uint32_t>(queue_size_),
       [this, index, add](const sensor_msgs::CameraInfoConstPtr& info) {
+        try {
+          requireTime(info->header, inputs_[index].topic);
+        } catch (const std::exception& e) {
+          monitor_.error(e.what());
+          return;
+        }
         note(index, info->header.stamp);
         (join_.*add)(info);
       });

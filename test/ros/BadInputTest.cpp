@@ -492,6 +492,11 @@ TEST_F(ForeignDisparity, ofAnotherLayoutIsAnError) {
   expectError([](Frame& frame) { frame.disparity->image.is_bigendian ^= 1; }, {topic, "is_bigendian"});
 }
 
+TEST_F(ForeignDisparity, withoutATimeIsAnError) {
+  expectError([](Frame& frame) { frame.disparity->header.stamp = frame.labels->header.stamp = ros::Time(); },
+              {"/foreign/disparity: the stamp is 0", "expected the time of exposure"});
+}
+
 TEST_F(ForeignDisparity, withoutGeometryIsAnError) {
   const std::string topic = "/foreign/disparity: ";
   expectError([](Frame& frame) { frame.disparity->f = 0.0F; }, {topic, "f is 0 px"});

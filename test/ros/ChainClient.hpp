@@ -70,6 +70,11 @@ class Listener {
     return wait([&stamp](const Message& message) { return message.header.stamp == stamp; }, timeout);
   }
 
+  std::vector<ConstPtr> all() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return messages_;
+  }
+
   std::size_t count() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return messages_.size();
@@ -160,11 +165,12 @@ class StereoCamera {
     return messages;
   }
 
+  /// What is null does not come.
   void publish(const StereoMessages& messages) {
-    left_info_.publish(messages.left_info);
-    right_info_.publish(messages.right_info);
-    left_.publish(messages.left);
-    right_.publish(messages.right);
+    if (messages.left_info) left_info_.publish(messages.left_info);
+    if (messages.right_info) right_info_.publish(messages.right_info);
+    if (messages.left) left_.publish(messages.left);
+    if (messages.right) right_.publish(messages.right);
   }
 
   /// Publishes frame `index`; its stamp.

@@ -22,19 +22,25 @@ bool isLoaded(const std::string& library) {
   return false;
 }
 
-TEST(ImageSubscriber, rawNeedsNoPlugin) {
-  ros::NodeHandle nh, private_nh("~");
+class ImageSubscriberTest : public testing::Test {
+ protected:
+  ros::NodeHandle nh, private_nh{"~"};
+  StageMonitor monitor{"image_subscriber_test", nh, private_nh};
+};
+
+TEST_F(ImageSubscriberTest, rawNeedsNoPlugin) {
   ImageSubscriber subscriber;
-  subscriber.subscribe(nh, private_nh, "image", 1, [](const sensor_msgs::ImageConstPtr&) {});
+  subscriber.subscribe(nh, private_nh, "image", 1, monitor, [](const sensor_msgs::ImageConstPtr&) {});
   EXPECT_TRUE(subscriber.isSubscribed());
   ASSERT_TRUE(isLoaded("libimage_transport.so"));
   EXPECT_FALSE(isLoaded("libimage_transport_plugins.so"));
 }
 
-TEST(ImageSubscriber, receivesWhateverThreadsSubscribeAtTheSameTime) {
-  ros::NodeHandle nh, private_nh("~");
+TEST_F(ImageSubscriberTest, receivesWhateverThreadsSubscribeAtTheSameTime) {
   ros::Publisher publisher = nh.advertise<sensor_msgs::Image>("image", 1, true);
-  publisher.publish(sensor_msgs::Image());
+  sensor_msgs::Image image;
+  image.header.stamp = ros::Time(1, 0);
+  publisher.publish(image);
   constexpr int THREADS = 8, ROUNDS = 20;
   for (int round = 0; round < ROUNDS; ++round) {
     std::vector<std::unique_ptr<ImageSubscriber>> subscribers;
@@ -48,7 +54,7 @@ TEST(ImageSubscriber, receivesWhateverThreadsSubscribeAtTheSameTime) {
         while (ready < THREADS) std::this_thread::yield();
         try {
           subscribers[i]->subscribe(
-              nh, private_nh, "image", 1,
+              nh, private_nh, "image", 1, monitor,
               [&received, i](const sensor_msgs::ImageConstPtr&) { received[i] = true; });
         } catch (const std::exception& e) {
           ADD_FAILURE() << e.what();
@@ -65,25 +71,24 @@ TEST(ImageSubscriber, receivesWhateverThreadsSubscribeAtTheSameTime) {
   }
 }
 
-TEST(ImageSubscriber, hearsNothingAfterItsShutdown) {
-  ros::NodeHandle nh, private_nh("~");
+TEST_F(ImageSubscriberTest, hearsNothingAfterItsShutdown) {
   ros::Publisher publisher = nh.advertise<sensor_msgs::Image>("image", 1);
   ImageSubscriber subscriber;
   EXPECT_FALSE(subscriber.isSubscribed());
-  subscriber.subscribe(nh, private_nh, "image", 1, [](const sensor_msgs::ImageConstPtr&) {});
+  subscriber.subscribe(nh, private_nh, "image", 1, monitor, [](const sensor_msgs::ImageConstPtr&) {});
   EXPECT_TRUE(waitFor([&] { return publisher.getNumSubscribers() == 1; }));
   subscriber.shutdown();
   EXPECT_FALSE(subscriber.isSubscribed());
   EXPECT_TRUE(waitFor([&] { return publisher.getNumSubscribers() == 0; }));
 }
 
-TEST(ImageSubscriber, refusesATransportThatIsNotInstalled) {
-  ros::NodeHandle nh, private_nh("~unknown");
+TEST_F(ImageSubscriberTest, refusesATransportThatIsNotInstalled) {
+  const ros::NodeHandle private_nh("~unknown");
   private_nh.setParam("image_transport", "carrier_pigeon");
   ImageSubscriber subscriber;
   for (int attempt = 0; attempt < 2; ++attempt) {
     try {
-      subscriber.subscribe(nh, private_nh, "image", 1, [](const sensor_msgs::ImageConstPtr&) {});
+      subscriber.subscribe(nh, private_nh, "image", 1, monitor, [](const sensor_msgs::ImageConstPtr&) {});
       ADD_FAILURE() << "nothing was thrown";
     } catch (const image_transport::TransportLoadException& e) {
       EXPECT_NE(std::string(e.what()).find("carrier_pigeon"), std::string::npos) << e.what();

@@ -40,6 +40,18 @@ std::string refusal(const std::function<void()>& call) {
     EXPECT_NE(text.find(word2), std::string::npos) << text; \
   } while (false)
 
+TEST(RequireTime, refusesWhatIsNoTimeOfExposure) {
+  std_msgs::Header header;
+  EXPECT_REFUSED(requireTime(header, "/left"), "/left: the stamp is 0, ", "expected the time of exposure");
+  // The last one that is no more than ros::Duration can span from any other.
+  header.stamp = ros::Time(2147483647U, 999999999U);
+  EXPECT_NO_THROW(requireTime(header, "/left"));
+  header.stamp.sec += 1;
+  EXPECT_REFUSED(requireTime(header, "/left"), "/left: the stamp is beyond", "expected the time of exposure");
+  header.stamp = ros::TIME_MIN;
+  EXPECT_NO_THROW(requireTime(header, "/left"));
+}
+
 TEST(GrayImage, sharesTheMemoryOfGrayImages) {
   for (const std::string& encoding : {enc::MONO8, enc::TYPE_8UC1}) {
     const auto message = image(encoding, cv::Mat(3, 5, CV_8UC1, cv::Scalar(7)));

@@ -20,6 +20,10 @@
 /// Every error is a std::invalid_argument that names the topic.
 namespace disparity_refinement {
 
+/// Throws if the stamp is no time of exposure: 0, which ROS takes for unknown, or so late that ros::Duration
+/// cannot span the time until then.
+void requireTime(const std_msgs::Header& header, const std::string& topic);
+
 /// The image as CV_8UC1: mono8 and 8UC1 share the message's memory, any other colour, Bayer or 16-bit
 /// encoding is converted.
 cv_bridge::CvImageConstPtr grayImage(const sensor_msgs::ImageConstPtr& message, const std::string& topic);

@@ -19,6 +19,7 @@ namespace disparity_refinement {
 /// Parameters on the private handle: ~approximate_sync (false), ~approximate_sync_max_interval [s] (0.01),
 /// ~queue_size [frames] (1), ~sync_warning_period [s] (5), ~image_transport (raw).
 ///
+/// - Messages without a time of exposure are refused with an error, see ImageSubscriber.
 /// - Images without a partner are counted.
 /// - Messages without a pair for a whole warning period: a warning says how many came on each topic, how far
 /// the
