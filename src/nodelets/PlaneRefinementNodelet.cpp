@@ -25,6 +25,7 @@
 #include "disparity_refinement/ros/LiveParameters.hpp"
 #include "disparity_refinement/ros/Messages.hpp"
 #include "disparity_refinement/ros/OptionalJoin.hpp"
+#include "disparity_refinement/ros/PartnerWatch.hpp"
 #include "disparity_refinement/ros/StageMonitor.hpp"
 #include "disparity_refinement/ros/StampCache.hpp"
 #include "disparity_refinement/ros/StampJoin.hpp"
@@ -39,6 +40,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
     // First whoever calls this object from another thread.
     stop();
     patience_timer_.stop();
+    if (partner_watch_) partner_watch_->stop();
     disparity_subscriber_.shutdown();
     labels_subscriber_.shutdown();
     image_subscriber_.shutdown();
@@ -74,6 +76,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
     join_ = std::make_unique<StampJoin<Disparity, Image>>(
         cache_size,
         [this](const Disparity::ConstPtr& disparity, const Image::ConstPtr& labels) {
+          partner_watch_->joined();
           const Frame frame{disparity, labels, nullptr};
           image_join_->addFrame(disparity->header.stamp, frame);
           // Nothing to wait for.
@@ -84,6 +87,8 @@ class PlaneRefinementNodelet : public LazyNodelet {
           monitor_->dropped(DropReason::NO_PARTNER, disparities);
           labels_without_disparity_ += labels;
         });
+    partner_watch_ = std::make_unique<PartnerWatch>(private_nh, *monitor_, nh.resolveName("disparity"),
+                                                    nh.resolveName("labels"));
     disparity_parameters_ = std::make_unique<StampCache<FrameParameters>>(cache_size);
     segmentation_parameters_ = std::make_unique<StampCache<FrameParameters>>(cache_size);
     monitor_->addDiagnostics(
@@ -96,6 +101,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
     patience_timer_ = private_nh.createWallTimer(
         patience, [this, patience](const ros::WallTimerEvent&) { image_join_->expire(patience); });
     monitor_->start();
+    partner_watch_->start();
     start();
   }
 
@@ -127,10 +133,14 @@ class PlaneRefinementNodelet : public LazyNodelet {
       subscribeImage();
     }
     if (!disparity_subscriber_) {
-      labels_subscriber_ =
-          subscribe<Image>("labels", [this](const Image::ConstPtr& labels) { join_->addSecond(labels); });
-      disparity_subscriber_ = subscribe<Disparity>(
-          "disparity", [this](const Disparity::ConstPtr& disparity) { join_->addFirst(disparity); });
+      labels_subscriber_ = subscribe<Image>("labels", [this](const Image::ConstPtr& labels) {
+        partner_watch_->receivedSecond();
+        join_->addSecond(labels);
+      });
+      disparity_subscriber_ = subscribe<Disparity>("disparity", [this](const Disparity::ConstPtr& disparity) {
+        partner_watch_->receivedFirst();
+        join_->addFirst(disparity);
+      });
     }
   }
 
@@ -353,6 +363,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
       segmentation_parameters_subscriber_;
   ImageSubscriber image_subscriber_;
   ros::WallTimer patience_timer_;
+  std::unique_ptr<PartnerWatch> partner_watch_;
   std::unique_ptr<FrameWorker<Frame>> worker_;
 };
 

@@ -497,6 +497,30 @@ TEST_F(ForeignDisparity, withoutATimeIsAnError) {
               {"/foreign/disparity: the stamp is 0", "expected the time of exposure"});
 }
 
+TEST_F(ForeignDisparity, withoutLabelsOfItsStampIsReported) {
+  const auto expectWarning = [](const std::function<void(const Frame&)>& send,
+                                const std::vector<std::string>& words) {
+    EXPECT_TRUE(waitFor([&] {
+      send(next());
+      return rig_->log.waitFor(words, Log::WARN, 0.1);
+    })) << words[0];
+    const auto message = process(next());
+    ASSERT_TRUE(message) << "the good frame after the bad one is not processed";
+    expectPlane(*message);
+  };
+  expectWarning(
+      [](const Frame& frame) {
+        frame.labels->header.stamp += ros::Duration(0.001);
+        publish(frame);
+      },
+      {"no two messages with the same stamp for 0.5 s", "/foreign/disparity ", "/foreign/labels ",
+       "both need the stamp of the left image"});
+  expectWarning([](const Frame& frame) { rig_->disparity.publish(frame.disparity); },
+                {"no two messages with the same stamp", "/foreign/labels 0", "does its publisher run?"});
+  expectWarning([](const Frame& frame) { rig_->labels.publish(frame.labels); },
+                {"no two messages with the same stamp", "/foreign/disparity 0", "does its publisher run?"});
+}
+
 TEST_F(ForeignDisparity, withoutGeometryIsAnError) {
   const std::string topic = "/foreign/disparity: ";
   expectError([](Frame& frame) { frame.disparity->f = 0.0F; }, {topic, "f is 0 px"});
