@@ -82,7 +82,8 @@ class PlaneRefinementNodelet : public LazyNodelet {
           // Nothing to wait for.
           if (!is_image_needed_) image_join_->flush();
         },
-        [this](int disparities, int labels) {
+        [this](const StampJoin<Disparity, Image>::Counts& dropped) {
+          const auto [disparities, labels] = dropped;
           monitor_->received(disparities);
           monitor_->dropped(DropReason::NO_PARTNER, disparities);
           labels_without_disparity_ += labels;

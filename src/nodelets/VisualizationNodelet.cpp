@@ -58,7 +58,7 @@ class VisualizationNodelet : public LazyNodelet {
         [this](const Image::ConstPtr& image, const Image::ConstPtr& labels) {
           worker_->push([this, image, labels] { drawBorders(image, labels); });
         },
-        [](int, int) {});
+        [](const auto&) {});
     disparity_publisher_ = advertiseImage(*transport_, "disparity_color");
     refined_publisher_ = advertiseImage(*transport_, "disparity_refined_color");
     labels_publisher_ = advertiseImage(*transport_, "labels_color");

@@ -4,6 +4,7 @@
 
 #include <boost/make_shared.hpp>
 #include <cstdint>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -43,7 +44,9 @@ class StampJoinTest : public testing::Test {
                                        matched_.push_back(a->header.stamp.sec);
                                        frames_.emplace_back(a->header.frame_id, b->header.frame_id);
                                      },
-                                     [this](int first, int second) { dropped_ += first + second; }};
+                                     [this](const auto& messages) {
+                                       dropped_ = std::accumulate(messages.begin(), messages.end(), dropped_);
+                                     }};
 };
 
 TEST_F(StampJoinTest, joinsWhicheverComesFirst) {
@@ -125,6 +128,86 @@ TEST_F(StampJoinTest, forgetsAllOnClear) {
   join_.clear();
   addDisparity(1);
   addLabels(2);
+  EXPECT_TRUE(matched_.empty());
+}
+
+class StampJoinOfThreeTest : public testing::Test {
+ protected:
+  template <std::size_t I>
+  void add(std::uint32_t second, const std::string& frame = "") {
+    const auto message = boost::make_shared<Labels>();
+    message->header.stamp = ros::Time(second, 0);
+    message->header.frame_id = frame;
+    join_.add<I>(message);
+  }
+
+  std::vector<std::string> matched_;
+  int dropped_ = 0;
+  StampJoin<Labels, Labels, Labels> join_{
+      2,
+      [this](const Labels::ConstPtr& a, const Labels::ConstPtr& b, const Labels::ConstPtr& c) {
+        EXPECT_EQ(a->header.stamp, b->header.stamp);
+        EXPECT_EQ(a->header.stamp, c->header.stamp);
+        matched_.push_back(std::to_string(a->header.stamp.sec) + a->header.frame_id + b->header.frame_id +
+                           c->header.frame_id);
+      },
+      [this](const auto& messages) {
+        dropped_ = std::accumulate(messages.begin(), messages.end(), dropped_);
+      }};
+};
+
+TEST_F(StampJoinOfThreeTest, joinsInAnyOrderOfArrival) {
+  add<0>(1, "a");
+  add<1>(1, "b");
+  EXPECT_TRUE(matched_.empty());
+  add<2>(1, "c");
+  add<2>(2, "c");
+  add<0>(2, "a");
+  add<1>(2, "b");
+  add<1>(3, "b");
+  add<2>(3, "c");
+  add<0>(3, "a");
+  EXPECT_EQ(matched_, (std::vector<std::string>{"1abc", "2abc", "3abc"}));
+  EXPECT_EQ(dropped_, 0);
+}
+
+TEST_F(StampJoinOfThreeTest, needsAllOfOneStamp) {
+  add<0>(1);
+  add<1>(1);
+  add<2>(2);
+  add<0>(2);
+  EXPECT_TRUE(matched_.empty());
+  EXPECT_EQ(dropped_, 0);
+}
+
+TEST_F(StampJoinOfThreeTest, countsWhatAMatchOvertakesInEveryStream) {
+  add<0>(1);
+  add<1>(1);
+  add<0>(2);
+  add<2>(2);
+  add<1>(2);
+  EXPECT_EQ(matched_, (std::vector<std::string>{"2"}));
+  EXPECT_EQ(dropped_, 2) << "the first of two streams";
+  add<2>(1);
+  EXPECT_EQ(matched_.size(), 1U) << "the others of this stamp are gone";
+}
+
+TEST_F(StampJoinOfThreeTest, keepsTheNewestUpToTheCapacity) {
+  for (const std::uint32_t second : {1, 2, 3}) {
+    add<0>(second);
+    add<1>(second);
+  }
+  EXPECT_EQ(dropped_, 2);
+  for (const std::uint32_t second : {1, 2, 3}) add<2>(second);
+  EXPECT_EQ(matched_, (std::vector<std::string>{"2", "3"}));
+  EXPECT_EQ(dropped_, 3) << "the first of the third stream too";
+}
+
+TEST_F(StampJoinOfThreeTest, forgetsAllOnClear) {
+  add<0>(1);
+  add<1>(1);
+  join_.clear();
+  add<2>(1);
   EXPECT_TRUE(matched_.empty());
 }
 

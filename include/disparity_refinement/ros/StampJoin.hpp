@@ -1,79 +1,94 @@
 #pragma once
 
+#include <ros/time.h>
+
 #include <algorithm>
+#include <array>
 #include <boost/shared_ptr.hpp>
 #include <cstddef>
 #include <deque>
 #include <functional>
 #include <iterator>
+#include <tuple>
 #include <utility>
 
 namespace disparity_refinement {
 
-/// Joins two streams of messages with equal stamps, however far one runs ahead of the other.
+/// Joins two or more streams of messages with equal stamps, however far one runs ahead of the others.
 ///
 /// Each stream keeps up to `capacity` messages in order of arrival, and arrival alone decides what is old: a
 /// jump back in time (rosbag play --loop) needs no special care. Messages that a later match has overtaken
 /// are dropped.
-template <class A, class B>
+template <class... Messages>
 class StampJoin {
  public:
-  using APtr = boost::shared_ptr<const A>;
-  using BPtr = boost::shared_ptr<const B>;
-  using Match = std::function<void(const APtr&, const BPtr&)>;
-  /// Called with the number of messages of each stream that were dropped without a partner.
-  using Drop = std::function<void(int, int)>;
+  template <std::size_t I>
+  using Ptr = boost::shared_ptr<const std::tuple_element_t<I, std::tuple<Messages...>>>;
+  using Match = std::function<void(const boost::shared_ptr<const Messages>&...)>;
+  /// Number of messages of each stream.
+  using Counts = std::array<int, sizeof...(Messages)>;
+  /// Called when messages were dropped without a partner.
+  using Drop = std::function<void(const Counts&)>;
 
   StampJoin(std::size_t capacity, Match match, Drop drop)
       : capacity_(capacity), match_(std::move(match)), drop_(std::move(drop)) {}
 
-  void addFirst(const APtr& message) {
-    add(
-        message, first_, second_, [this](const APtr& a, const BPtr& b) { match_(a, b); },
-        [this](int own, int other) { drop_(own, other); });
+  /// Adds a message to the stream of index I.
+  template <std::size_t I>
+  void add(const Ptr<I>& message) {
+    const ros::Time stamp = message->header.stamp;
+    auto& own = std::get<I>(streams_);
+    own.push_back(message);
+    const bool is_complete = std::apply(
+        [&stamp](auto&... stream) { return ((find(stream, stamp) != stream.rend()) && ...); }, streams_);
+    if (is_complete) {
+      emit(stamp);
+    } else if (own.size() > capacity_) {
+      own.pop_front();
+      Counts dropped{};
+      dropped[I] = 1;
+      drop_(dropped);
+    }
   }
 
-  void addSecond(const BPtr& message) {
-    add(
-        message, second_, first_, [this](const BPtr& b, const APtr& a) { match_(a, b); },
-        [this](int own, int other) { drop_(other, own); });
-  }
+  void addFirst(const Ptr<0>& message) { add<0>(message); }
+  void addSecond(const Ptr<1>& message) { add<1>(message); }
 
   void clear() {
-    first_.clear();
-    second_.clear();
+    std::apply([](auto&... stream) { (stream.clear(), ...); }, streams_);
   }
 
  private:
-  template <class Own, class Other, class Emit, class DropBoth>
-  void add(const Own& message, std::deque<Own>& own, std::deque<Other>& other, const Emit& emit,
-           const DropBoth& drop) {
+  template <class Stream>
+  static auto find(Stream& stream, const ros::Time& stamp) {
     // The newest of equal stamps: what is left of an earlier loop is older.
-    const auto partner = std::find_if(other.rbegin(), other.rend(), [&message](const Other& candidate) {
-      return candidate->header.stamp == message->header.stamp;
-    });
-    if (partner == other.rend()) {
-      own.push_back(message);
-      if (own.size() > capacity_) {
-        own.pop_front();
-        drop(1, 0);
-      }
-      return;
-    }
-    const Other found = *partner;
-    const auto overtaken = static_cast<int>(std::distance(other.begin(), partner.base()) - 1);
-    const auto overtaken_own = static_cast<int>(own.size());
-    other.erase(other.begin(), partner.base());
-    own.clear();
-    if (overtaken_own + overtaken > 0) drop(overtaken_own, overtaken);
-    emit(message, found);
+    return std::find_if(stream.rbegin(), stream.rend(),
+                        [&stamp](const auto& message) { return message->header.stamp == stamp; });
+  }
+
+  void emit(const ros::Time& stamp) {
+    Counts overtaken{};
+    const auto take = [&stamp, counter = overtaken.begin()](auto& stream) mutable {
+      const auto found = find(stream, stamp);
+      const auto message = *found;
+      *counter++ = static_cast<int>(std::distance(stream.begin(), found.base()) - 1);
+      stream.erase(stream.begin(), found.base());
+      return message;
+    };
+    const std::tuple<boost::shared_ptr<const Messages>...> match = std::apply(
+        [&take](auto&... stream) {
+          // In the order of the streams, since these are braces.
+          return std::tuple<boost::shared_ptr<const Messages>...>{take(stream)...};
+        },
+        streams_);
+    if (overtaken != Counts{}) drop_(overtaken);
+    std::apply(match_, match);
   }
 
   const std::size_t capacity_;
   const Match match_;
   const Drop drop_;
-  std::deque<APtr> first_;
-  std::deque<BPtr> second_;
+  std::tuple<std::deque<boost::shared_ptr<const Messages>>...> streams_;
 };
 
 }  // namespace disparity_refinement
