@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <opencv2/core.hpp>
 #include <sstream>
@@ -34,6 +35,15 @@ inline void requireImage(const cv::Mat& image, const char* name, int type, const
 /// The same for an image of any size.
 inline void requireImage(const cv::Mat& image, const char* name, int type) {
   requireImage(image, name, type, cv::Size(image.cols, image.rows));
+}
+
+/// Throws std::invalid_argument unless the image has labels of this size, all less than the number of planes.
+inline void requireLabels(const cv::Mat& labels, const cv::Size& size, std::size_t planes) {
+  requireImage(labels, "labels", CV_32SC1, size);
+  double largest = 0.0;
+  cv::minMaxLoc(labels, nullptr, &largest);
+  requireArgument(largest < static_cast<double>(planes), "the largest label", largest,
+                  "less than the number of planes, " + std::to_string(planes));
 }
 
 /// Whether the bytes from the first to the last pixel of two images meet.

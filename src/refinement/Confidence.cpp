@@ -42,11 +42,7 @@ void findSources(const cv::Mat& disparity, const cv::Mat& refined, const cv::Mat
                  const DisparityRange& range, const std::vector<SegmentPlane>& fitted, cv::Mat& sources) {
   requireImage(disparity, "disparity", CV_32FC1);
   requireImage(refined, "refined", CV_32FC1, disparity.size());
-  requireImage(labels, "labels", CV_32SC1, disparity.size());
-  double largest = 0.0;
-  cv::minMaxLoc(labels, nullptr, &largest);
-  requireArgument(largest < static_cast<double>(fitted.size()), "the largest label", largest,
-                  "less than the number of planes, " + std::to_string(fitted.size()));
+  requireLabels(labels, disparity.size(), fitted.size());
   sources.create(disparity.size(), CV_8UC1);
   for (int y = 0; y < disparity.rows; ++y) {
     const auto *d = disparity.ptr<float>(y), *r = refined.ptr<float>(y);

@@ -219,4 +219,25 @@ PlanesPtr planesMessage(const std_msgs::Header& header, const std::vector<Segmen
   return message;
 }
 
+std::vector<SegmentPlane> segmentPlanes(const Planes& message, const std::string& topic) {
+  std::vector<SegmentPlane> planes(message.planes.size());
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    const Plane& in = message.planes[i];
+    if (in.status > Plane::OF_NEIGHBOUR) {
+      refuse(topic, "the status of plane ", i, " is ", static_cast<int>(in.status),
+             ", expected one of Plane.msg, 0 to ", static_cast<int>(Plane::OF_NEIGHBOUR));
+    }
+    SegmentPlane& plane = planes[i];
+    plane.status = static_cast<PlaneStatus>(in.status);
+    plane.a = in.a;
+    plane.b = in.b;
+    plane.c = in.c;
+    plane.pixels = static_cast<int>(in.pixels);
+    plane.valid = static_cast<int>(in.valid);
+    plane.inliers = static_cast<int>(in.inliers);
+    plane.iterations = static_cast<int>(in.iterations);
+  }
+  return planes;
+}
+
 }  // namespace disparity_refinement

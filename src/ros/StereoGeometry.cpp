@@ -3,10 +3,8 @@
 #include <algorithm>
 
 namespace disparity_refinement {
-namespace {
 
-/// P of the image as published: binning and region of interest applied to the full-resolution matrix.
-ProjectionMatrix projection(const sensor_msgs::CameraInfo& info) {
+ProjectionMatrix projectionMatrix(const sensor_msgs::CameraInfo& info) {
   ProjectionMatrix p{};
   std::copy(info.P.begin(), info.P.end(), p.begin());
   const double binning_x = std::max<std::uint32_t>(1, info.binning_x);
@@ -20,10 +18,8 @@ ProjectionMatrix projection(const sensor_msgs::CameraInfo& info) {
   return p;
 }
 
-}  // namespace
-
 StereoGeometry stereoGeometry(const sensor_msgs::CameraInfo& left, const sensor_msgs::CameraInfo& right) {
-  return stereoGeometry(projection(left), projection(right));
+  return stereoGeometry(projectionMatrix(left), projectionMatrix(right));
 }
 
 }  // namespace disparity_refinement

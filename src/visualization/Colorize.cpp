@@ -89,6 +89,39 @@ void drawSegmentBorders(const cv::Mat& image, const cv::Mat& labels, cv::Mat& bg
   }
 }
 
+cv::Vec3b refusalColour(PlaneStatus status) {
+  switch (status) {
+    case PlaneStatus::ACCEPTED:
+      return BLACK;
+    case PlaneStatus::TOO_FEW_POINTS:
+      return {0, 150, 255};
+    case PlaneStatus::DEGENERATE:
+      return {230, 0, 230};
+    case PlaneStatus::MAX_ITERATIONS:
+      return {0, 0, 255};
+    case PlaneStatus::OF_NEIGHBOUR:
+      return {255, 120, 0};
+  }
+  return BLACK;
+}
+
+void drawRefusedSegments(const cv::Mat& gray, const cv::Mat& labels, const std::vector<SegmentPlane>& planes,
+                         cv::Mat& bgr) {
+  requireImage(gray, "gray", CV_8UC1);
+  requireLabels(labels, gray.size(), planes.size());
+  cv::cvtColor(gray, bgr, cv::COLOR_GRAY2BGR);
+  for (int y = 0; y < labels.rows; ++y) {
+    const int* row = labels.ptr<int>(y);
+    cv::Vec3b* out = bgr.ptr<cv::Vec3b>(y);
+    for (int x = 0; x < labels.cols; ++x) {
+      if (row[x] < 0) continue;
+      const PlaneStatus status = planes[static_cast<std::size_t>(row[x])].status;
+      if (status != PlaneStatus::ACCEPTED) out[x] = out[x] / 2 + refusalColour(status) / 2;
+    }
+  }
+  drawSegmentBorders(bgr, labels, bgr, {200, 200, 200});
+}
+
 void colorizeError(const cv::Mat& disparity, const DisparityRange& range, const cv::Mat& ground_truth,
                    cv::Mat& bgr) {
   requireImage(disparity, "disparity", CV_32FC1);

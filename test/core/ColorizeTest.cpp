@@ -5,6 +5,7 @@
 #include <set>
 #include <stdexcept>
 #include <tuple>
+#include <vector>
 
 #include "disparity_refinement/visualization/Colorize.hpp"
 
@@ -136,6 +137,67 @@ TEST(DrawSegmentBorders, drawsOnColourImagesAndInPlace) {
   EXPECT_EQ(cv::norm(image, bgr, cv::NORM_INF), 0.0);
 }
 
+std::vector<SegmentPlane> planesOf(const std::vector<PlaneStatus>& statuses) {
+  std::vector<SegmentPlane> planes(statuses.size());
+  for (std::size_t i = 0; i < statuses.size(); ++i) planes[i].status = statuses[i];
+  return planes;
+}
+
+const std::vector<PlaneStatus> ALL_STATUSES = {PlaneStatus::ACCEPTED, PlaneStatus::TOO_FEW_POINTS,
+                                               PlaneStatus::DEGENERATE, PlaneStatus::MAX_ITERATIONS,
+                                               PlaneStatus::OF_NEIGHBOUR};
+
+TEST(RefusalColour, tellsTheReasonsApart) {
+  EXPECT_EQ(refusalColour(PlaneStatus::ACCEPTED), BLACK);
+  EXPECT_EQ(refusalColour(PlaneStatus::TOO_FEW_POINTS), cv::Vec3b(0, 150, 255));
+  EXPECT_EQ(refusalColour(PlaneStatus::DEGENERATE), cv::Vec3b(230, 0, 230));
+  EXPECT_EQ(refusalColour(PlaneStatus::MAX_ITERATIONS), cv::Vec3b(0, 0, 255));
+  EXPECT_EQ(refusalColour(PlaneStatus::OF_NEIGHBOUR), cv::Vec3b(255, 120, 0));
+}
+
+TEST(DrawRefusedSegments, tintsThemByTheirReason) {
+  // Columns of two pixels: the right one of each is before another label. The last column has no label.
+  cv::Mat gray(1, 12, CV_8UC1), labels(1, 12, CV_32SC1);
+  for (int x = 0; x < 12; ++x) {
+    gray.at<uchar>(0, x) = static_cast<uchar>(20 * x);
+    labels.at<int>(0, x) = x < 10 ? x / 2 : -1;
+  }
+  cv::Mat bgr;
+  drawRefusedSegments(gray, labels, planesOf(ALL_STATUSES), bgr);
+  ASSERT_EQ(bgr.type(), CV_8UC3);
+  const cv::Vec3b BORDER(200, 200, 200);
+  for (int x = 1; x < 10; x += 2) EXPECT_EQ(at(bgr, x), BORDER) << x;
+  EXPECT_EQ(at(bgr, 0), BLACK) << "accepted, gray level 0";
+  EXPECT_EQ(at(bgr, 2), cv::Vec3b(20, 20 + 75, 20 + 128)) << "too few points, gray level 40";
+  EXPECT_EQ(at(bgr, 4), cv::Vec3b(40 + 115, 40, 40 + 115)) << "degenerate, gray level 80";
+  EXPECT_EQ(at(bgr, 6), cv::Vec3b(60, 60, 60 + 128)) << "maximum number of iterations, gray level 120";
+  EXPECT_EQ(at(bgr, 8), cv::Vec3b(80 + 128, 80 + 60, 80)) << "of a neighbour, gray level 160";
+  EXPECT_EQ(at(bgr, 10), cv::Vec3b(200, 200, 200)) << "no segment, gray level 200";
+  EXPECT_EQ(at(bgr, 11), cv::Vec3b(220, 220, 220)) << "no segment, gray level 220";
+}
+
+TEST(DrawRefusedSegments, leavesAnImageWithoutRefusedSegmentsGray) {
+  const cv::Mat gray = (cv::Mat_<uchar>(2, 2) << 1, 2, 3, 255);
+  cv::Mat bgr;
+  drawRefusedSegments(gray, cv::Mat::zeros(2, 2, CV_32SC1), planesOf({PlaneStatus::ACCEPTED}), bgr);
+  for (int i = 0; i < 4; ++i) {
+    const uchar level = gray.at<uchar>(i / 2, i % 2);
+    EXPECT_EQ(at(bgr, i % 2, i / 2), cv::Vec3b(level, level, level));
+  }
+}
+
+TEST(DrawRefusedSegments, refusesLabelsWithoutAPlane) {
+  const cv::Mat gray(1, 2, CV_8UC1, cv::Scalar(20)), labels = (cv::Mat_<int>(1, 2) << 0, 3);
+  cv::Mat bgr;
+  try {
+    drawRefusedSegments(gray, labels, planesOf({PlaneStatus::ACCEPTED, PlaneStatus::ACCEPTED}), bgr);
+    FAIL() << "accepted";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "the largest label is 3, expected less than the number of planes, 2");
+  }
+  EXPECT_TRUE(bgr.empty());
+}
+
 TEST(ColorizeError, followsItsLegend) {
   const Row truth = (Row(1, 10) << 20, 20, 20, 20, 20, 20, 20, 20, 0, 20);
   const Row disparity = (Row(1, 10) << 21, 21.0625F, 18, 17.9375F, 17, 23.0625F, 60, -1, 20, NOT_A_NUMBER);
@@ -163,6 +225,8 @@ TEST(Colorize, writesIntoAPictureOfTheRightTypeAndSize) {
   EXPECT_EQ(bgr.data, data);
   drawSegmentBorders(gray, labels, bgr);
   EXPECT_EQ(bgr.data, data);
+  drawRefusedSegments(gray, labels, {SegmentPlane()}, bgr);
+  EXPECT_EQ(bgr.data, data);
   colorizeError(disparity, {}, disparity, bgr);
   EXPECT_EQ(bgr.data, data);
   EXPECT_EQ(at(large, 2, 3), GREEN);
@@ -181,6 +245,10 @@ TEST(Colorize, refusesImagesOfAnotherTypeOrSize) {
   EXPECT_THROW(drawSegmentBorders(disparity, labels, bgr), std::invalid_argument);
   EXPECT_THROW(drawSegmentBorders(gray, gray, bgr), std::invalid_argument);
   EXPECT_THROW(drawSegmentBorders(gray, labels.colRange(0, 3), bgr), std::invalid_argument);
+  const std::vector<SegmentPlane> planes(1);
+  EXPECT_THROW(drawRefusedSegments(disparity, labels, planes, bgr), std::invalid_argument);
+  EXPECT_THROW(drawRefusedSegments(gray, gray, planes, bgr), std::invalid_argument);
+  EXPECT_THROW(drawRefusedSegments(gray, labels.colRange(0, 3), planes, bgr), std::invalid_argument);
   EXPECT_THROW(colorizeError(gray, {}, disparity, bgr), std::invalid_argument);
   EXPECT_THROW(colorizeError(disparity, {}, gray, bgr), std::invalid_argument);
   try {

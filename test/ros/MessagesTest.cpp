@@ -343,6 +343,42 @@ TEST(PlanesMessage, copiesEveryField) {
   EXPECT_EQ(copy.status, Plane::MAX_ITERATIONS);
 }
 
+TEST(PlanesMessage, isReadAsItWasWritten) {
+  SegmentPlane plane;
+  plane.a = 0.25;
+  plane.b = -0.5;
+  plane.c = 7.0;
+  plane.pixels = 100;
+  plane.valid = 90;
+  plane.inliers = 80;
+  plane.iterations = 70;
+  plane.status = PlaneStatus::OF_NEIGHBOUR;
+  const auto planes = segmentPlanes(*planesMessage({}, {SegmentPlane(), plane}), "planes");
+  ASSERT_EQ(planes.size(), 2U);
+  EXPECT_EQ(planes[0].status, PlaneStatus::TOO_FEW_POINTS);
+  EXPECT_EQ(planes[1].a, 0.25);
+  EXPECT_EQ(planes[1].b, -0.5);
+  EXPECT_EQ(planes[1].c, 7.0);
+  EXPECT_EQ(planes[1].pixels, 100);
+  EXPECT_EQ(planes[1].valid, 90);
+  EXPECT_EQ(planes[1].inliers, 80);
+  EXPECT_EQ(planes[1].iterations, 70);
+  EXPECT_EQ(planes[1].status, PlaneStatus::OF_NEIGHBOUR);
+}
+
+TEST(PlanesMessage, isRefusedWithAnUnknownStatus) {
+  Planes message;
+  message.planes.resize(3);
+  message.planes[2].status = 5;
+  try {
+    segmentPlanes(message, "/stereo/planes");
+    FAIL() << "accepted";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(),
+                 "/stereo/planes: the status of plane 2 is 5, expected one of Plane.msg, 0 to 4");
+  }
+}
+
 TEST(PlanesMessage, hasTheStatusOfTheCore) {
   EXPECT_EQ(static_cast<int>(PlaneStatus::ACCEPTED), Plane::ACCEPTED);
   EXPECT_EQ(static_cast<int>(PlaneStatus::TOO_FEW_POINTS), Plane::TOO_FEW_POINTS);

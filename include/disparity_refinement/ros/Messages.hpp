@@ -59,4 +59,7 @@ void publishParameters(const ros::Publisher& publisher, const std_msgs::Header& 
 /// Without parameters.
 PlanesPtr planesMessage(const std_msgs::Header& header, const std::vector<SegmentPlane>& planes);
 
+/// The planes of a message; throws if one has a status that Plane.msg does not know.
+std::vector<SegmentPlane> segmentPlanes(const Planes& message, const std::string& topic);
+
 }  // namespace disparity_refinement

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <vector>
 
 #include "disparity_refinement/DisparityRange.hpp"
+#include "disparity_refinement/refinement/PlaneRefinementParameters.hpp"
 
 namespace disparity_refinement {
 
@@ -34,6 +36,19 @@ void colorizeLabels(const cv::Mat& labels, cv::Mat& bgr);
 /// @param colour  blue, green, red
 void drawSegmentBorders(const cv::Mat& image, const cv::Mat& labels, cv::Mat& bgr,
                         const cv::Vec3b& colour = {0, 255, 255});
+
+/// The colour of a segment whose plane was refused, blue, green, red: too few points orange, degenerate
+/// magenta, maximum number of iterations red, of a neighbour blue. Black if it was accepted.
+cv::Vec3b refusalColour(PlaneStatus status);
+
+/// The image with every segment whose plane was refused half in its refusalColour, and segment borders
+/// in light gray. Negative labels belong to no segment.
+///
+/// @param gray    CV_8UC1
+/// @param labels  CV_32SC1 of the same size.
+/// @param planes  Plane of every label; a label beyond them throws std::invalid_argument.
+void drawRefusedSegments(const cv::Mat& gray, const cv::Mat& labels, const std::vector<SegmentPlane>& planes,
+                         cv::Mat& bgr);
 
 /// Absolute error of a disparity map: green up to 1 px, yellow up to 2 px, orange up to 3 px, red beyond.
 /// Grey: the truth is known, but there is no disparity. Black: the truth is unknown.
