@@ -1,27 +1,37 @@
 #include <image_transport/image_transport.h>
 #include <ros/ros.h>
+#include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/image_encodings.h>
 #include <stereo_msgs/DisparityImage.h>
+#include <visualization_msgs/MarkerArray.h>
 
+#include <algorithm>
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
+#include "disparity_refinement/Planes.h"
 #include "disparity_refinement/ros/FrameWorker.hpp"
 #include "disparity_refinement/ros/ImageSubscriber.hpp"
 #include "disparity_refinement/ros/LazyNodelet.hpp"
 #include "disparity_refinement/ros/LiveParameters.hpp"
 #include "disparity_refinement/ros/Messages.hpp"
+#include "disparity_refinement/ros/PlaneMarkers.hpp"
 #include "disparity_refinement/ros/StageMonitor.hpp"
 #include "disparity_refinement/ros/StampJoin.hpp"
+#include "disparity_refinement/ros/StereoGeometry.hpp"
 #include "disparity_refinement/visualization/Colorize.hpp"
+#include "disparity_refinement/visualization/PlanePatches.hpp"
 
 namespace disparity_refinement {
 
-/// disparity, disparity_refined, labels, left/image_rect -> pictures. Each is computed only while somebody
-/// looks at it.
+/// disparity, disparity_refined, labels, planes, left/image_rect, left/camera_info -> pictures and markers.
+/// Each is computed only while somebody looks at it.
 class VisualizationNodelet : public LazyNodelet {
  public:
   ~VisualizationNodelet() override {
@@ -30,15 +40,20 @@ class VisualizationNodelet : public LazyNodelet {
     disparity_subscriber_.shutdown();
     refined_subscriber_.shutdown();
     labels_subscriber_.shutdown();
+    planes_subscriber_.shutdown();
+    info_subscriber_.shutdown();
     image_subscriber_.shutdown();
     worker_.reset();
     monitor_.reset();
   }
 
  private:
+  using CameraInfo = sensor_msgs::CameraInfo;
   using Disparity = stereo_msgs::DisparityImage;
   using Image = sensor_msgs::Image;
+  using MarkerArray = visualization_msgs::MarkerArray;
   using Picture = std::function<void()>;
+  static constexpr int QUEUE_SIZE = 5;  // Of messages: callbacks only pass them on.
 
   void onInit() override {
     ros::NodeHandle& nh = getNodeHandle();
@@ -49,59 +64,113 @@ class VisualizationNodelet : public LazyNodelet {
       const std::lock_guard<std::mutex> lock(imageTransportMutex());
       transport_ = std::make_unique<image_transport::ImageTransport>(nh);
     }
-    constexpr std::size_t PICTURES = 4;
+    constexpr std::size_t PICTURES = 6;
     worker_ =
         std::make_unique<FrameWorker<Picture>>(PICTURES, *monitor_, [](const Picture& draw) { draw(); });
-    constexpr std::size_t CACHE_SIZE = 30;
-    join_ = std::make_unique<StampJoin<Image, Image>>(
-        CACHE_SIZE,
-        [this](const Image::ConstPtr& image, const Image::ConstPtr& labels) {
-          worker_->push([this, image, labels] { drawBorders(image, labels); });
+    const auto cache_size = static_cast<std::size_t>(std::max(1, private_nh.param("cache_size", 30)));
+    const auto ignore = [](const auto&) {};
+    borders_join_ = std::make_unique<StampJoin<Image, Image>>(
+        cache_size,
+        [this](const Image::ConstPtr& labels, const Image::ConstPtr& image) {
+          worker_->push([this, labels, image] { drawBorders(labels, image); });
         },
-        [](const auto&) {});
+        ignore);
+    refused_join_ = std::make_unique<StampJoin<Image, Image, Planes>>(
+        cache_size,
+        [this](const Image::ConstPtr& labels, const Image::ConstPtr& image, const Planes::ConstPtr& planes) {
+          worker_->push([this, labels, image, planes] { drawRefused(labels, image, *planes); });
+        },
+        ignore);
+    markers_join_ = std::make_unique<StampJoin<Image, Disparity, Planes>>(
+        cache_size,
+        [this](const Image::ConstPtr& labels, const Disparity::ConstPtr& refined,
+               const Planes::ConstPtr& planes) {
+          // The camera's calibration does not change from frame to frame: the newest will do.
+          worker_->push([this, labels, refined, planes, info = info_] {
+            drawMarkers(*labels, *refined, *planes, info);
+          });
+        },
+        ignore);
     disparity_publisher_ = advertiseImage(*transport_, "disparity_color");
     refined_publisher_ = advertiseImage(*transport_, "disparity_refined_color");
     labels_publisher_ = advertiseImage(*transport_, "labels_color");
     borders_publisher_ = advertiseImage(*transport_, "segment_borders");
+    refused_publisher_ = advertiseImage(*transport_, "refused_segments");
+    markers_publisher_ = advertise<MarkerArray>(nh, "plane_markers");
     monitor_->start();
     start();
   }
 
   void updateSubscriptions() override {
-    const bool borders = borders_publisher_.getNumSubscribers() > 0;
-    subscribeDisparity(disparity_publisher_, "disparity", disparity_subscriber_);
-    subscribeDisparity(refined_publisher_, "disparity_refined", refined_subscriber_);
+    const bool borders = isHeard(borders_publisher_), refused = isHeard(refused_publisher_),
+               markers = isHeard(markers_publisher_);
+    monitor_->setActive(borders || refused || markers || isHeard(disparity_publisher_) ||
+                        isHeard(refined_publisher_) || isHeard(labels_publisher_));
+    if (!borders) borders_join_->clear();
+    if (!refused) refused_join_->clear();
+    if (!markers) markers_join_->clear();
 
-    if (!borders && labels_publisher_.getNumSubscribers() == 0) {
-      labels_subscriber_.shutdown();
-    } else if (!labels_subscriber_) {
-      labels_subscriber_ =
-          getNodeHandle().subscribe<Image>("labels", 1, [this](const Image::ConstPtr& labels) {
-            if (labels_publisher_.getNumSubscribers() > 0)
-              worker_->push([this, labels] { drawLabels(labels); });
-            if (borders_publisher_.getNumSubscribers() > 0) join_->addSecond(labels);
-          });
-    }
-    if (!borders) {
+    // First: planes do not wait for it.
+    subscribeWhile(markers, "left/camera_info", info_subscriber_, &VisualizationNodelet::receiveInfo);
+    subscribeWhile(isHeard(disparity_publisher_), "disparity", disparity_subscriber_,
+                   &VisualizationNodelet::receiveDisparity);
+    subscribeWhile(isHeard(refined_publisher_) || markers, "disparity_refined", refined_subscriber_,
+                   &VisualizationNodelet::receiveRefined);
+    subscribeWhile(isHeard(labels_publisher_) || borders || refused || markers, "labels", labels_subscriber_,
+                   &VisualizationNodelet::receiveLabels);
+    subscribeWhile(refused || markers, "planes", planes_subscriber_, &VisualizationNodelet::receivePlanes);
+    if (!borders && !refused) {
       image_subscriber_.shutdown();
-      join_->clear();
     } else if (!image_subscriber_.isSubscribed()) {
-      image_subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect", 1, *monitor_,
-                                  [this](const Image::ConstPtr& image) { join_->addFirst(image); });
+      image_subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect", QUEUE_SIZE,
+                                  *monitor_, [this](const Image::ConstPtr& image) { receiveImage(image); });
     }
   }
 
-  void subscribeDisparity(const image_transport::Publisher& publisher, const std::string& topic,
-                          ros::Subscriber& subscriber) {
-    if (publisher.getNumSubscribers() == 0) {
+  /// Whatever ~lazy says: pictures are for somebody who looks at them.
+  template <class Publisher>
+  static bool isHeard(const Publisher& publisher) {
+    return publisher.getNumSubscribers() > 0;
+  }
+
+  template <class Message>
+  void subscribeWhile(bool is_wanted, const std::string& topic, ros::Subscriber& subscriber,
+                      void (VisualizationNodelet::*receive)(const boost::shared_ptr<const Message>&)) {
+    if (!is_wanted) {
       subscriber.shutdown();
     } else if (!subscriber) {
-      subscriber = getNodeHandle().subscribe<Disparity>(
-          topic, 1, [this, &publisher, topic](const Disparity::ConstPtr& disparity) {
-            worker_->push(
-                [this, &publisher, topic, disparity] { drawDisparity(*disparity, topic, publisher); });
-          });
+      subscriber = getNodeHandle().subscribe(topic, QUEUE_SIZE, receive, this);
     }
+  }
+
+  void receiveInfo(const CameraInfo::ConstPtr& info) { info_ = info; }
+
+  void receiveDisparity(const Disparity::ConstPtr& disparity) {
+    worker_->push([this, disparity] { drawDisparity(*disparity, "disparity", disparity_publisher_); });
+  }
+
+  void receiveRefined(const Disparity::ConstPtr& refined) {
+    if (isHeard(refined_publisher_)) {
+      worker_->push([this, refined] { drawDisparity(*refined, "disparity_refined", refined_publisher_); });
+    }
+    if (isHeard(markers_publisher_)) markers_join_->add<1>(refined);
+  }
+
+  void receiveLabels(const Image::ConstPtr& labels) {
+    if (isHeard(labels_publisher_)) worker_->push([this, labels] { drawLabels(labels); });
+    if (isHeard(borders_publisher_)) borders_join_->add<0>(labels);
+    if (isHeard(refused_publisher_)) refused_join_->add<0>(labels);
+    if (isHeard(markers_publisher_)) markers_join_->add<0>(labels);
+  }
+
+  void receiveImage(const Image::ConstPtr& image) {
+    if (isHeard(borders_publisher_)) borders_join_->add<1>(image);
+    if (isHeard(refused_publisher_)) refused_join_->add<1>(image);
+  }
+
+  void receivePlanes(const Planes::ConstPtr& planes) {
+    if (isHeard(refused_publisher_)) refused_join_->add<2>(planes);
+    if (isHeard(markers_publisher_)) markers_join_->add<2>(planes);
   }
 
   void drawDisparity(const Disparity& message, const std::string& topic,
@@ -123,13 +192,67 @@ class VisualizationNodelet : public LazyNodelet {
             [&](cv::Mat& picture) { colorizeLabels(labels, picture); });
   }
 
-  void drawBorders(const Image::ConstPtr& image, const Image::ConstPtr& message) {
+  void drawBorders(const Image::ConstPtr& message, const Image::ConstPtr& image) {
     monitor_->traceReceived("left/image_rect", image->header.stamp, image->data.data());
     monitor_->traceReceived("labels", message->header.stamp, message->data.data());
     const cv::Mat labels = labelView(*message);
     const auto gray = grayImage(image, getNodeHandle().resolveName("left/image_rect"));
     publish(image->header, labels.size(), borders_publisher_,
             [&](cv::Mat& picture) { drawSegmentBorders(gray->image, labels, picture); });
+  }
+
+  void drawRefused(const Image::ConstPtr& message, const Image::ConstPtr& image, const Planes& planes) {
+    const cv::Mat labels = labelView(*message);
+    const auto gray = grayImage(image, getNodeHandle().resolveName("left/image_rect"));
+    const auto segments = segmentPlanes(planes, getNodeHandle().resolveName("planes"));
+    publish(image->header, labels.size(), refused_publisher_, [&](cv::Mat& picture) {
+      nameTopics({"left/image_rect", "labels", "planes"},
+                 [&] { drawRefusedSegments(gray->image, labels, segments, picture); });
+    });
+  }
+
+  void drawMarkers(const Image& message, const Disparity& refined, const Planes& planes,
+                   const CameraInfo::ConstPtr& info) {
+    const ros::WallTime begin = ros::WallTime::now();
+    const std::string info_topic = getNodeHandle().resolveName("left/camera_info");
+    if (!info) {
+      // When a listener has just come, the first frame may be under way without.
+      if (++frames_without_info_ > 1) {
+        monitor_->warning("no message on " + info_topic + ": no " + markers_publisher_.getTopic() +
+                          ", expected the principal point of the left image");
+      }
+      return;
+    }
+    const ProjectionMatrix p = projectionMatrix(*info);
+    if (!std::isfinite(p[2]) || !std::isfinite(p[6])) {
+      throw std::invalid_argument(info_topic + ": the principal point P[2], P[6] is " + std::to_string(p[2]) +
+                                  ", " + std::to_string(p[6]) + ", expected finite values");
+    }
+    const cv::Mat labels = labelView(message);
+    const auto segments = segmentPlanes(planes, getNodeHandle().resolveName("planes"));
+    const StereoGeometry geometry =
+        disparityGeometry(refined, getNodeHandle().resolveName("disparity_refined"));
+    std::vector<PlanePatch> patches;
+    nameTopics({"labels", "planes"}, [&] {
+      patches = findPlanePatches(labels, segments, geometry, {p[2], p[6]});
+    });
+    const auto markers = planeMarkers(message.header, patches);
+    monitor_->published(message.header.stamp, (ros::WallTime::now() - begin).toSec() * 1e3);
+    markers_publisher_.publish(markers);
+  }
+
+  /// What the core refuses, with the names of the topics it came from.
+  template <class Compute>
+  void nameTopics(const std::vector<std::string>& topics, const Compute& compute) {
+    try {
+      compute();
+    } catch (const std::invalid_argument& e) {
+      std::string names;
+      for (const std::string& topic : topics) {
+        names += (names.empty() ? "" : ", ") + getNodeHandle().resolveName(topic);
+      }
+      throw std::invalid_argument(names + ": " + e.what());
+    }
   }
 
   cv::Mat labelView(const Image& message) {
@@ -151,9 +274,16 @@ class VisualizationNodelet : public LazyNodelet {
   std::unique_ptr<StageMonitor> monitor_;
   std::unique_ptr<LiveParameters<VisualizationConfig>> parameters_;
   std::unique_ptr<image_transport::ImageTransport> transport_;
-  image_transport::Publisher disparity_publisher_, refined_publisher_, labels_publisher_, borders_publisher_;
-  std::unique_ptr<StampJoin<Image, Image>> join_;
-  ros::Subscriber disparity_subscriber_, refined_subscriber_, labels_subscriber_;
+  image_transport::Publisher disparity_publisher_, refined_publisher_, labels_publisher_, borders_publisher_,
+      refused_publisher_;
+  ros::Publisher markers_publisher_;
+  std::unique_ptr<StampJoin<Image, Image>> borders_join_;              // labels, image
+  std::unique_ptr<StampJoin<Image, Image, Planes>> refused_join_;      // labels, image, planes
+  std::unique_ptr<StampJoin<Image, Disparity, Planes>> markers_join_;  // labels, refined disparity, planes
+  CameraInfo::ConstPtr info_;                                          // The newest, null if none came.
+  int frames_without_info_ = 0;
+  ros::Subscriber disparity_subscriber_, refined_subscriber_, labels_subscriber_, planes_subscriber_,
+      info_subscriber_;
   ImageSubscriber image_subscriber_;
   std::unique_ptr<FrameWorker<Picture>> worker_;
 };

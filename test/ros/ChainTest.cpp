@@ -4,6 +4,7 @@
 #include <dynamic_reconfigure/Reconfigure.h>
 #include <gtest/gtest.h>
 #include <stereo_msgs/DisparityImage.h>
+#include <visualization_msgs/MarkerArray.h>
 
 #include <cmath>
 
@@ -19,6 +20,7 @@ namespace {
 using sensor_msgs::CameraInfo;
 using sensor_msgs::Image;
 using stereo_msgs::DisparityImage;
+using visualization_msgs::MarkerArray;
 
 /// The parameters of chain.test, or of quality_chain.test.
 CoreParameters testParameters() {
@@ -303,8 +305,8 @@ TEST_F(Chain, subscribesOnlyWhileSomebodyListens) {
 }
 
 TEST_F(Chain, drawsThePicturesThatAreLookedAt) {
-  for (const char* topic :
-       {"disparity_color", "disparity_refined_color", "labels_color", "segment_borders"}) {
+  for (const char* topic : {"disparity_color", "disparity_refined_color", "labels_color", "segment_borders",
+                            "refused_segments"}) {
     Listener<Image> picture(nh_, topic);
     ASSERT_TRUE(camera_.waitForChain(picture)) << topic;
     const auto message = picture.wait([](const Image&) { return true; });
@@ -318,6 +320,24 @@ TEST_F(Chain, drawsThePicturesThatAreLookedAt) {
     cv::split(bgr, channels);
     EXPECT_GT(cv::norm(channels[0], channels[2], cv::NORM_INF), 50.0) << topic << " has no colour";
   }
+}
+
+TEST_F(Chain, drawsThePlanes) {
+  {
+    Listener<MarkerArray> markers(nh_, "plane_markers");
+    ASSERT_TRUE(waitFor([&] {
+      static int index = 0;
+      camera_.publish(index++);
+      return markers.wait(
+                 [](const MarkerArray& array) {
+                   return array.markers.size() == 2 && !array.markers[0].points.empty() &&
+                          array.markers[0].header.frame_id == "stereo_left";
+                 },
+                 0.5) != nullptr;
+    }));
+    EXPECT_GT(camera_.infoSubscribers(), 0);
+  }
+  EXPECT_TRUE(waitFor([this] { return camera_.leftSubscribers() == 0 && camera_.infoSubscribers() == 0; }));
 }
 
 }  // namespace
