@@ -53,7 +53,6 @@ class VisualizationNodelet : public LazyNodelet {
   using Image = sensor_msgs::Image;
   using MarkerArray = visualization_msgs::MarkerArray;
   using Picture = std::function<void()>;
-  static constexpr int QUEUE_SIZE = 5;  // Of messages: callbacks only pass them on.
 
   void onInit() override {
     ros::NodeHandle& nh = getNodeHandle();
@@ -122,8 +121,9 @@ class VisualizationNodelet : public LazyNodelet {
     if (!borders && !refused) {
       image_subscriber_.shutdown();
     } else if (!image_subscriber_.isSubscribed()) {
-      image_subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect", QUEUE_SIZE,
-                                  *monitor_, [this](const Image::ConstPtr& image) { receiveImage(image); });
+      image_subscriber_.subscribe(getNodeHandle(), getPrivateNodeHandle(), "left/image_rect",
+                                  INPUT_QUEUE_SIZE, *monitor_,
+                                  [this](const Image::ConstPtr& image) { receiveImage(image); });
     }
   }
 
@@ -139,7 +139,7 @@ class VisualizationNodelet : public LazyNodelet {
     if (!is_wanted) {
       subscriber.shutdown();
     } else if (!subscriber) {
-      subscriber = getNodeHandle().subscribe(topic, QUEUE_SIZE, receive, this);
+      subscriber = getNodeHandle().subscribe(topic, INPUT_QUEUE_SIZE, receive, this);
     }
   }
 
