@@ -68,7 +68,7 @@ class StampJoin {
 
   void emit(const ros::Time& stamp) {
     Counts overtaken{};
-    const auto take = [&stamp, counter = overtaken.begin()](auto& stream) mutable {
+    auto take = [&stamp, counter = overtaken.begin()](auto& stream) mutable {
       const auto found = find(stream, stamp);
       const auto message = *found;
       *counter++ = static_cast<int>(std::distance(stream.begin(), found.base()) - 1);
