@@ -3,6 +3,7 @@ import argparse
 import json
 import pathlib
 import shutil
+import signal
 import sys
 import tempfile
 
@@ -93,4 +94,6 @@ def main():
     sys.exit(0 if all(holds for _, holds in results) else 1)
 
 
+# As an exception: what was started is ended.
+signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
 main()

@@ -5,6 +5,7 @@ import os
 import pathlib
 import random
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -233,4 +234,6 @@ def main():
     shutil.rmtree(folder)
 
 
+# As an exception: what was started is ended.
+signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
 main()

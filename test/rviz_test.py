@@ -302,4 +302,6 @@ def main():
 
 
 if __name__ == "__main__":
+    # As an exception: what was started is ended.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     main()
