@@ -23,6 +23,7 @@ class DepthNodelet : public LazyNodelet {
   ~DepthNodelet() override {
     // First whoever calls this object from another thread.
     stop();
+    if (monitor_) monitor_->stop();
     info_subscriber_.shutdown();
     disparity_subscriber_.shutdown();
     worker_.reset();

@@ -23,6 +23,7 @@ class DisparityNodelet : public LazyNodelet {
   ~DisparityNodelet() override {
     // First whoever calls this object from another thread.
     stop();
+    if (monitor_) monitor_->stop();
     if (subscriber_) subscriber_->unsubscribe();
     worker_.reset();
     subscriber_.reset();

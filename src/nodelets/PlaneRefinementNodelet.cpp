@@ -39,6 +39,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
   ~PlaneRefinementNodelet() override {
     // First whoever calls this object from another thread.
     stop();
+    if (monitor_) monitor_->stop();
     patience_timer_.stop();
     if (partner_watch_) partner_watch_->stop();
     disparity_subscriber_.shutdown();

@@ -24,6 +24,7 @@ class SegmentationNodelet : public LazyNodelet {
   ~SegmentationNodelet() override {
     // First whoever calls this object from another thread.
     stop();
+    if (monitor_) monitor_->stop();
     patience_timer_.stop();
     subscriber_.shutdown();
     announcement_subscriber_.shutdown();

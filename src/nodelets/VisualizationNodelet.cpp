@@ -37,6 +37,7 @@ class VisualizationNodelet : public LazyNodelet {
   ~VisualizationNodelet() override {
     // First whoever calls this object from another thread.
     stop();
+    if (monitor_) monitor_->stop();
     disparity_subscriber_.shutdown();
     refined_subscriber_.shutdown();
     labels_subscriber_.shutdown();

@@ -44,6 +44,8 @@ StageMonitor::StageMonitor(const std::string& name, const ros::NodeHandle& nh,
 
 void StageMonitor::start() { timer_.start(); }
 
+void StageMonitor::stop() { timer_.stop(); }
+
 void StageMonitor::addDiagnostics(const Task& task) { tasks_.push_back(task); }
 
 void StageMonitor::setActive(bool is_active) {

@@ -36,6 +36,10 @@ class StageMonitor {
   /// Ends the nodelet's onInit(): from here on /diagnostics is published.
   void start();
 
+  /// Begins the nodelet's destructor: no task of addDiagnostics() is under way when it returns, nor called
+  /// any more.
+  void stop();
+
   /// Adds lines to the diagnostics of the stage. To be called before start().
   void addDiagnostics(const Task& task);
 
@@ -83,7 +87,6 @@ class StageMonitor {
   double min_rate_, max_dropped_, max_age_;
   std::vector<Task> tasks_;
   diagnostic_updater::Updater updater_;
-  ros::WallTimer timer_;
 
   mutable std::mutex mutex_;
   bool is_active_ = true;
@@ -92,6 +95,7 @@ class StageMonitor {
   ros::WallTime last_report_ = ros::WallTime::now();
   std::string last_error_;
   std::map<std::string, ros::WallTime> last_logged_;
+  ros::WallTimer timer_;  // last: it uses the others
 };
 
 }  // namespace disparity_refinement
