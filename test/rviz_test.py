@@ -24,6 +24,7 @@ TOOLS = ROOT / "build/devel/lib/disparity_refinement"
 SCREEN = 1600, 900
 WINDOW_HEIGHT = 860
 PATIENCE = 300.0  # [s]
+ATTEMPTS = 3  # When rviz has died
 RATE = 0.05  # Of the playback of 10 frames a second: the processor draws, too.
 # rviz's colours of the name of a display that has an error or a warning.
 ERROR, WARNING = (192, 32, 32), (192, 128, 0)
@@ -118,7 +119,7 @@ def started(command, log):
 def display():
     """An X server with a free display number, of which programs draw by the processor."""
     ours, theirs = os.pipe()
-    command = ["Xvfb", "-displayfd", str(theirs), "-screen", "0", "%dx%dx24" % SCREEN, "-nolisten", "tcp"]
+    command = ["Xvfb", "-displayfd", str(theirs), "-screen", "0", "%dx%dx24" % SCREEN, "-nolisten", "tcp", "-noreset"]
     process = subprocess.Popen(command, pass_fds=[theirs], stderr=subprocess.DEVNULL)
     os.close(theirs)
     try:
@@ -252,8 +253,8 @@ def log_faults(folder):
                 yield f"{log.name}: {line}"
 
 
-def check(name, command, player, namespace, mode, folder):
-    """The first screenshot that has everything; ends the program if there is none."""
+def look(name, command, player, namespace, mode, folder):
+    """The first screenshot that has everything, or the last one, and what is not as it should be."""
     folder.mkdir()
     screen = folder / "screen.ppm"
     port = free_port()
@@ -268,11 +269,22 @@ def check(name, command, player, namespace, mode, folder):
         deadline = time.monotonic() + PATIENCE
         while faults and time.monotonic() < deadline:
             time.sleep(2.0)
+            if re.search("rviz-.*process has died", (folder / "roslaunch.log").read_text(errors="replace")):
+                break
             regions = find_regions(screenshot(screen))
             if regions:
                 faults = list(layout_faults(regions)) + list(picture_faults(regions, mode)) + \
                     list(topic_faults(master, namespace))
-    faults += log_faults(folder)
+    return screen, faults + list(log_faults(folder))
+
+
+def check(name, command, player, namespace, mode, folder):
+    """The screenshot; ends the program if something is wrong with it."""
+    for attempt in range(ATTEMPTS):
+        screen, faults = look(name, command, player, namespace, mode, folder.with_name(f"{folder.name}{attempt}"))
+        # Seldom, rviz dies in OpenGL before it opens a window: another one starts.
+        if not any(re.search("rviz-.*process has died", fault) for fault in faults):
+            break
     if faults:
         kept = ROOT / "build/rviz_test.png"
         keep(screen, kept)
