@@ -1,13 +1,16 @@
 #include <ros/ros.h>
+#include <std_msgs/Header.h>
 #include <stereo_msgs/DisparityImage.h>
 
 #include <algorithm>
 #include <memory>
+#include <opencv2/core/utility.hpp>
 #include <pluginlib/class_list_macros.hpp>
 #include <stdexcept>
 #include <string>
 
 #include "disparity_refinement/matching/StereoMatcher.hpp"
+#include "disparity_refinement/ros/FlowControl.hpp"
 #include "disparity_refinement/ros/FrameWorker.hpp"
 #include "disparity_refinement/ros/LazyNodelet.hpp"
 #include "disparity_refinement/ros/LiveParameters.hpp"
@@ -25,6 +28,7 @@ class DisparityNodelet : public LazyNodelet {
     stop();
     if (monitor_) monitor_->stop();
     if (subscriber_) subscriber_->unsubscribe();
+    done_subscriber_.shutdown();
     worker_.reset();
     subscriber_.reset();
     monitor_.reset();
@@ -37,8 +41,12 @@ class DisparityNodelet : public LazyNodelet {
     monitor_ = std::make_unique<StageMonitor>(getName(), nh, private_nh);
     parameters_ = std::make_unique<LiveParameters<DisparityConfig>>(private_nh);
     const auto queue_size = static_cast<std::size_t>(std::max(1, private_nh.param("queue_size", 1)));
+    const auto max_frames =
+        static_cast<std::size_t>(std::max(0, private_nh.param("max_frames_in_flight", 0)));
+    flow_control_ = std::make_unique<FlowControl>(max_frames, cv::getNumThreads());
     worker_ = std::make_unique<FrameWorker<StereoFrame>>(
-        queue_size, *monitor_, [this](const StereoFrame& frame) { process(frame); });
+        queue_size, *monitor_, [this](const StereoFrame& frame) { process(frame); },
+        [this] { return flow_control_->delay(ros::WallTime::now()); });
     subscriber_ = std::make_unique<StereoSubscriber>(
         nh, private_nh, *monitor_, [this](const StereoFrame& frame) { worker_->push(frame); });
     publisher_ = advertise<stereo_msgs::DisparityImage>(nh, "disparity");
@@ -52,7 +60,17 @@ class DisparityNodelet : public LazyNodelet {
     monitor_->setActive(is_wanted);
     if (!is_wanted) {
       subscriber_->unsubscribe();
+      done_subscriber_.shutdown();
     } else {
+      if (!done_subscriber_) {
+        done_subscriber_ = getNodeHandle().subscribe<std_msgs::Header>(
+            "refinement_done", INPUT_QUEUE_SIZE,
+            [this](const std_msgs::Header::ConstPtr& done) {
+              flow_control_->refined(done->stamp, ros::WallTime::now());
+              worker_->wake();
+            },
+            {}, ros::TransportHints().tcpNoDelay());
+      }
       subscriber_->subscribe();
     }
   }
@@ -83,8 +101,11 @@ class DisparityNodelet : public LazyNodelet {
       throw std::invalid_argument(subscriber_->leftImageTopic() + ", " + subscriber_->rightImageTopic() +
                                   ": " + e.what());
     }
-    monitor_->published(message->header.stamp, (ros::WallTime::now() - begin).toSec() * 1e3);
+    const ros::WallTime end = ros::WallTime::now();
+    const double seconds = (end - begin).toSec();
+    monitor_->published(message->header.stamp, seconds * 1e3);
     monitor_->tracePublished("disparity", message->header.stamp, message->image.data.data());
+    flow_control_->matched(message->header.stamp, seconds, end);
     publisher_.publish(message);
   }
 
@@ -123,6 +144,8 @@ class DisparityNodelet : public LazyNodelet {
   bool warned_about_frame_ids_ = false;
   ros::Publisher publisher_, parameters_publisher_;
   std::unique_ptr<StereoSubscriber> subscriber_;
+  std::unique_ptr<FlowControl> flow_control_;
+  ros::Subscriber done_subscriber_;
   std::unique_ptr<FrameWorker<StereoFrame>> worker_;
 };
 

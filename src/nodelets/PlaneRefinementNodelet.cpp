@@ -1,6 +1,7 @@
 #include <ros/ros.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/image_encodings.h>
+#include <std_msgs/Header.h>
 #include <stereo_msgs/DisparityImage.h>
 
 #include <algorithm>
@@ -67,8 +68,12 @@ class PlaneRefinementNodelet : public LazyNodelet {
     queue_size_ = std::max(1, private_nh.param("queue_size", 1));
     min_density_ = private_nh.param("diagnostics_min_density", 0.0);
     const auto cache_size = static_cast<std::size_t>(std::max(1, private_nh.param("cache_size", 30)));
-    worker_ = std::make_unique<FrameWorker<Frame>>(queue_size_, *monitor_,
-                                                   [this](const Frame& frame) { process(frame); });
+    worker_ = std::make_unique<FrameWorker<Frame>>(queue_size_, *monitor_, [this](const Frame& frame) {
+      // In whatever way it ends.
+      const std::shared_ptr<void> announcement(
+          nullptr, [&](void* /*unused*/) { done_publisher_.publish(frame.disparity->header); });
+      process(frame);
+    });
     image_join_ = std::make_unique<OptionalJoin<Frame, Image>>(
         cache_size, [this](Frame frame, const Image::ConstPtr& image) {
           frame.image = image;
@@ -99,6 +104,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
     planes_publisher_ = advertise<Planes>(nh, "planes");
     source_publisher_ = advertise<Image>(nh, "disparity_source");
     confidence_publisher_ = advertise<Image>(nh, "confidence");
+    done_publisher_ = nh.advertise<std_msgs::Header>("refinement_done", PUBLISHER_QUEUE_SIZE);
     const ros::WallDuration patience(0.25);
     patience_timer_ = private_nh.createWallTimer(
         patience, [this, patience](const ros::WallTimerEvent&) { image_join_->expire(patience); });
@@ -358,7 +364,8 @@ class PlaneRefinementNodelet : public LazyNodelet {
   std::mutex statistics_mutex_;
   std::optional<RefinementStatistics> statistics_;  // Until they are reported.
   std::unique_ptr<StampCache<FrameParameters>> disparity_parameters_, segmentation_parameters_;
-  ros::Publisher refined_publisher_, planes_publisher_, source_publisher_, confidence_publisher_;
+  ros::Publisher refined_publisher_, planes_publisher_, source_publisher_, confidence_publisher_,
+      done_publisher_;
   std::unique_ptr<OptionalJoin<Frame, Image>> image_join_;
   std::unique_ptr<StampJoin<Disparity, Image>> join_;
   ros::Subscriber disparity_subscriber_, labels_subscriber_, disparity_parameters_subscriber_,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <deque>
@@ -23,11 +24,16 @@ template <class Frame>
 class FrameWorker {
  public:
   using Process = std::function<void(const Frame&)>;
+  using Delay = std::function<double()>;
 
-  FrameWorker(std::size_t queue_size, StageMonitor& monitor, Process process)
+  /// @param delay  How long to wait before the next frame is taken [s], 0: no longer. Asked again after that
+  ///               time and after wake(). Newer frames take the place of the waiting ones meanwhile.
+  FrameWorker(
+      std::size_t queue_size, StageMonitor& monitor, Process process, Delay delay = [] { return 0.0; })
       : queue_size_(queue_size),
         monitor_(monitor),
         process_(std::move(process)),
+        delay_(std::move(delay)),
         thread_([this] { run(); }) {}
 
   /// Ends after the frame at work.
@@ -56,12 +62,23 @@ class FrameWorker {
     wake_.notify_one();
   }
 
+  /// The delay may be over.
+  void wake() {
+    // Not between the worker's question and its wait.
+    { const std::lock_guard<std::mutex> lock(mutex_); }
+    wake_.notify_one();
+  }
+
  private:
   void run() {
     std::unique_lock<std::mutex> lock(mutex_);
     while (true) {
       wake_.wait(lock, [this] { return stop_ || !queue_.empty(); });
       if (stop_) return;
+      if (const double delay = delay_(); delay > 0.0) {
+        wake_.wait_for(lock, std::chrono::duration<double>(delay));
+        continue;
+      }
       {
         const Frame frame = std::move(queue_.front());
         queue_.pop_front();
@@ -86,6 +103,7 @@ class FrameWorker {
   const std::size_t queue_size_;
   StageMonitor& monitor_;
   const Process process_;
+  const Delay delay_;
   std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<Frame> queue_;
