@@ -3,10 +3,12 @@
 #include <stereo_msgs/DisparityImage.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <opencv2/core.hpp>
-#include <string>
+#include <thread>
 #include <vector>
 
 #include "ChainClient.hpp"
@@ -56,15 +58,14 @@ inline bool sameBits(const cv::Mat& a, const cv::Mat& b) {
          std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
 }
 
-/// A chain in a namespace, with a camera in front of it whose frames are known by their content. A frame has
-/// an index, of which follow its stamp and one of CONTENTS pairs, and with that what the chain has to make of
-/// it.
-class CheckedChain {
+/// A camera whose frames are known by their content. A frame has an index, of which follow its stamp and one
+/// of CONTENTS pairs, and with that what the chain has to make of it.
+class KnownCamera {
  public:
   static constexpr int CONTENTS = 6;
   using Disparity = stereo_msgs::DisparityImage;
 
-  CheckedChain(const std::string& name, const CoreParameters& parameters) : nh("/" + name), camera(nh) {
+  KnownCamera(ros::NodeHandle& nh, const CoreParameters& parameters) : camera(nh) {
     CoreParameters paper = parameters;
     paper.refinement.mode = RefinementMode::PAPER;
     for (int i = 0; i < CONTENTS; ++i) {
@@ -74,8 +75,6 @@ class CheckedChain {
     }
   }
 
-  bool connect() { return camera.waitForChain(refined); }
-
   /// An earlier index than 0 has the content of 0, as StereoCamera's.
   static int content(int index) { return std::max(0, index) % CONTENTS; }
 
@@ -84,20 +83,12 @@ class CheckedChain {
     return camera.make(frame.left, frame.right, StereoCamera::stamp(index));
   }
 
-  /// The same with the right camera's stamps later by `seconds`.
-  StereoMessages makeApart(int index, double seconds) const {
-    StereoMessages messages = make(index);
-    messages.right->header.stamp += ros::Duration(seconds);
-    messages.right_info->header.stamp = messages.right->header.stamp;
-    return messages;
-  }
-
   void publish(int index) { camera.publish(make(index)); }
 
-  /// Whether the refined map of a frame arrives.
-  bool arrives(int index, double timeout = TIMEOUT) {
-    return refined.wait(StereoCamera::stamp(index), timeout) != nullptr;
-  }
+  /// Publishes the next frame of the process: no two cameras of it publish the same.
+  void publishNext() { publish(index()++); }
+  /// Stamp of the newest frame so published.
+  ros::Time lastStamp() const { return StereoCamera::stamp(index() - 1); }
 
   /// Whether this map is what the core makes of the pair of content `i`. When the left image of a frame is
   /// late, the refinement beyond the paper does without it.
@@ -115,8 +106,8 @@ class CheckedChain {
     return false;
   }
 
-  /// Maps so far that are not those of the pair with their stamp.
-  int countWrongPairs() {
+  /// Maps that are not those of the pair with their stamp.
+  int countWrongPairs(const Listener<Disparity>& refined) const {
     int wrong = 0;
     for (const auto& message : refined.all()) {
       const double index = (message->header.stamp - StereoCamera::stamp(0)).toSec() / 0.1;
@@ -125,13 +116,42 @@ class CheckedChain {
     return wrong;
   }
 
-  ros::NodeHandle nh;
   StereoCamera camera;
-  Listener<Disparity> refined{nh, "disparity_refined"};
 
  private:
+  static std::atomic<int>& index() {
+    static std::atomic<int> index{0};
+    return index;
+  }
+
   std::vector<StreetFrame> frames_;
   std::vector<cv::Mat> refined_, without_image_;  ///< What the core makes of frames_.
+};
+
+/// Publishes a frame every 50 ms until it is destroyed.
+class Driver {
+ public:
+  explicit Driver(KnownCamera& camera) : camera_(camera), thread_([this] { run(); }) {}
+
+  ~Driver() {
+    stop_ = true;
+    thread_.join();
+  }
+
+  Driver(const Driver&) = delete;
+  Driver& operator=(const Driver&) = delete;
+
+ private:
+  void run() {
+    while (!stop_) {
+      camera_.publishNext();
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+  }
+
+  KnownCamera& camera_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;  // last: it uses the others
 };
 
 }  // namespace disparity_refinement

@@ -28,9 +28,9 @@ class SimulatedTime : public testing::Test {
  protected:
   /// Two frames, of which the second has to come out.
   void expectFrames(int first) {
-    for (const int index : {first, first + 1}) chain.publish(index);
-    EXPECT_TRUE(chain.arrives(first + 1)) << first;
-    EXPECT_EQ(chain.countWrongPairs(), 0);
+    for (const int index : {first, first + 1}) camera.publish(index);
+    EXPECT_TRUE(refined.wait(StereoCamera::stamp(first + 1))) << first;
+    EXPECT_EQ(camera.countWrongPairs(refined), 0);
   }
 
   void expectDiagnostics() {
@@ -40,20 +40,22 @@ class SimulatedTime : public testing::Test {
     })) << "nothing on /diagnostics";
   }
 
-  CheckedChain chain{"stereo", testParameters()};
-  Listener<diagnostic_msgs::DiagnosticArray> diagnostics{chain.nh, "/diagnostics"};
+  ros::NodeHandle nh{"/stereo"};
+  KnownCamera camera{nh, testParameters()};
+  Listener<stereo_msgs::DisparityImage> refined{nh, "disparity_refined"};
+  Listener<diagnostic_msgs::DiagnosticArray> diagnostics{nh, "/diagnostics"};
 };
 
 TEST_F(SimulatedTime, thatHasNotBegunStopsNothing) {
   ASSERT_TRUE(ros::Time::now().isZero());
-  ASSERT_TRUE(chain.connect());
+  ASSERT_TRUE(camera.camera.waitForChain(refined));
   expectFrames(0);
   expectDiagnostics();
 }
 
 TEST_F(SimulatedTime, thatJumpsOrStandsStillStopsNothing) {
-  ros::Publisher clock = chain.nh.advertise<rosgraph_msgs::Clock>("/clock", 10);
-  ASSERT_TRUE(chain.connect());
+  ros::Publisher clock = nh.advertise<rosgraph_msgs::Clock>("/clock", 10);
+  ASSERT_TRUE(camera.camera.waitForChain(refined));
   constexpr int HOUR = 36000;  // frames
   // Ahead, an hour back, almost to the beginning of time, the same time once more, and ahead again.
   for (const int first : {2 * HOUR, HOUR, 1, 1, 3 * HOUR}) {
@@ -65,18 +67,18 @@ TEST_F(SimulatedTime, thatJumpsOrStandsStillStopsNothing) {
     }));
     expectFrames(first);
     expectDiagnostics();
-    chain.refined.clear();
+    refined.clear();
   }
 }
 
 TEST_F(SimulatedTime, ofABagInALoopBringsItsFramesInEveryLoop) {
-  constexpr int FRAMES = CheckedChain::CONTENTS, LOOPS = 3;
+  constexpr int FRAMES = KnownCamera::CONTENTS, LOOPS = 3;
   const TemporaryFolder folder;
   const std::string file = (folder / "loop.bag").string();
   {
     rosbag::Bag bag(file, rosbag::bagmode::Write);
     for (int i = 0; i < FRAMES; ++i) {
-      const StereoMessages messages = chain.make(i);
+      const StereoMessages messages = camera.make(i);
       const ros::Time& time = messages.left->header.stamp;
       bag.write("/stereo/left/camera_info", time, messages.left_info);
       bag.write("/stereo/right/camera_info", time, messages.right_info);
@@ -91,7 +93,7 @@ TEST_F(SimulatedTime, ofABagInALoopBringsItsFramesInEveryLoop) {
   const auto countWholeLoops = [this] {
     int loops = -1, frames = 0;  // where the first one begins is not known
     ros::Time last = ros::TIME_MAX;
-    for (const auto& message : chain.refined.all()) {
+    for (const auto& message : refined.all()) {
       if (message->header.stamp <= last) {
         if (frames >= FRAMES - 2) ++loops;
         frames = 0;
@@ -102,7 +104,7 @@ TEST_F(SimulatedTime, ofABagInALoopBringsItsFramesInEveryLoop) {
     return loops;
   };
   EXPECT_TRUE(waitFor([&] { return countWholeLoops() >= LOOPS; }, 60.0)) << countWholeLoops() << " loops";
-  EXPECT_EQ(chain.countWrongPairs(), 0);
+  EXPECT_EQ(camera.countWrongPairs(refined), 0);
   expectDiagnostics();
 }
 

@@ -35,7 +35,7 @@ class TimeFault : public testing::TestWithParam<std::string> {
     std::unique_ptr<Rig>& rig = rigs_[GetParam()];
     if (!rig) {
       rig = std::make_unique<Rig>(GetParam(), parameters());
-      ASSERT_TRUE(rig->chain.connect());
+      ASSERT_TRUE(rig->camera.camera.waitForChain(rig->refined));
     }
     rig_ = rig.get();
   }
@@ -52,7 +52,19 @@ class TimeFault : public testing::TestWithParam<std::string> {
     return parameters;
   }
 
-  CheckedChain& chain() { return rig_->chain; }
+  KnownCamera& camera() { return rig_->camera; }
+  Listener<stereo_msgs::DisparityImage>& refined() { return rig_->refined; }
+
+  /// A frame whose right image and CameraInfo are stamped later by `seconds`.
+  StereoMessages makeApart(int index, double seconds) {
+    StereoMessages messages = camera().make(index);
+    messages.right->header.stamp += ros::Duration(seconds);
+    messages.right_info->header.stamp = messages.right->header.stamp;
+    return messages;
+  }
+
+  /// Whether the refined map of a frame arrives.
+  bool arrives(int index) { return refined().wait(StereoCamera::stamp(index)) != nullptr; }
 
   /// No two frames of a chain have the same.
   int nextIndex() { return rig_->index++; }
@@ -62,9 +74,9 @@ class TimeFault : public testing::TestWithParam<std::string> {
   void expectLog(int level, const std::vector<std::vector<std::string>>& lines, const Spoil& spoil) {
     std::size_t found = 0;
     EXPECT_TRUE(waitFor([&] {
-      StereoMessages messages = chain().make(nextIndex());
+      StereoMessages messages = camera().make(nextIndex());
       spoil(messages);
-      chain().camera.publish(messages);
+      camera().camera.publish(messages);
       while (found < lines.size() && rig_->log.waitFor(lines[found], level, 0.1)) ++found;
       return found == lines.size();
     })) << testing::PrintToString(lines[std::min(found, lines.size() - 1)]);
@@ -73,23 +85,25 @@ class TimeFault : public testing::TestWithParam<std::string> {
 
   void publishSpoilt(const Spoil& spoil) {
     for (int i = 0; i < 3; ++i) {
-      StereoMessages messages = chain().make(nextIndex());
+      StereoMessages messages = camera().make(nextIndex());
       spoil(messages);
-      chain().camera.publish(messages);
+      camera().camera.publish(messages);
     }
   }
 
   void expectRecovery() {
-    for (const int i : {nextIndex(), nextIndex()}) chain().publish(i);
-    EXPECT_TRUE(chain().arrives(rig_->index - 1)) << "no frame comes out after the fault";
-    EXPECT_EQ(chain().countWrongPairs(), 0);
-    chain().refined.clear();
+    for (const int i : {nextIndex(), nextIndex()}) camera().publish(i);
+    EXPECT_TRUE(arrives(rig_->index - 1)) << "no frame comes out after the fault";
+    EXPECT_EQ(camera().countWrongPairs(refined()), 0);
+    refined().clear();
   }
 
   struct Rig {
-    Rig(const std::string& name, const CoreParameters& parameters) : chain(name, parameters), log(chain.nh) {}
-    CheckedChain chain;
-    LogListener log;
+    Rig(const std::string& name, const CoreParameters& parameters) : nh("/" + name), camera(nh, parameters) {}
+    ros::NodeHandle nh;
+    KnownCamera camera;
+    Listener<stereo_msgs::DisparityImage> refined{nh, "disparity_refined"};
+    LogListener log{nh};
     int index = 0;
   };
   static std::map<std::string, std::unique_ptr<Rig>> rigs_;
@@ -129,7 +143,7 @@ TEST_P(TimeFault, stampThatIsNoTimeIsRefused) {
     }
     for (const Spoil& spoil : faults) {
       publishSpoilt(spoil);
-      EXPECT_FALSE(chain().refined.wait(stamp, 0.0));
+      EXPECT_FALSE(refined().wait(stamp, 0.0));
       expectRecovery();
     }
     rig_->log.clear();
@@ -138,8 +152,8 @@ TEST_P(TimeFault, stampThatIsNoTimeIsRefused) {
 
 TEST_P(TimeFault, stampThatStandsStillIsRefused) {
   const int good = nextIndex();
-  chain().publish(good);
-  ASSERT_TRUE(chain().arrives(good));
+  camera().publish(good);
+  ASSERT_TRUE(arrives(good));
   const std::string end = ": several images with the same stamp, expected the time of exposure of each";
   expectLog(Log::ERROR,
             {{"/disparity] " + topic("left/image_rect") + end},
@@ -153,13 +167,13 @@ TEST_P(TimeFault, stampOfACoarseClockIsThatOfItsFirstFrame) {
   constexpr int TICKS = 4, FRAMES = 3;
   for (int tick = 0; tick < TICKS; ++tick) {
     const int first = nextIndex();
-    chain().publish(first);
+    camera().publish(first);
     for (int i = 1; i < FRAMES; ++i) {
-      StereoMessages messages = chain().make(nextIndex());
+      StereoMessages messages = camera().make(nextIndex());
       setStamp(messages, StereoCamera::stamp(first));
-      chain().camera.publish(messages);
+      camera().camera.publish(messages);
     }
-    EXPECT_TRUE(chain().arrives(first)) << "tick " << tick;
+    EXPECT_TRUE(arrives(first)) << "tick " << tick;
   }
   expectRecovery();
 }
@@ -167,40 +181,38 @@ TEST_P(TimeFault, stampOfACoarseClockIsThatOfItsFirstFrame) {
 TEST_P(TimeFault, pairThatIsPlayedAgainAndAgainIsRefinedEveryTime) {
   const int index = nextIndex();
   for (int loop = 0; loop < 3; ++loop) {
-    chain().publish(index);
-    EXPECT_TRUE(chain().arrives(index)) << "loop " << loop;
-    EXPECT_EQ(chain().countWrongPairs(), 0);
-    chain().refined.clear();
+    camera().publish(index);
+    EXPECT_TRUE(arrives(index)) << "loop " << loop;
+    EXPECT_EQ(camera().countWrongPairs(refined()), 0);
+    refined().clear();
   }
   expectRecovery();
 }
 
 TEST_P(TimeFault, stampThatJumpsForASingleFrameIsFollowed) {
   for (const double jump : {3600.0, -600.0}) {
-    StereoMessages messages = chain().make(nextIndex());
+    StereoMessages messages = camera().make(nextIndex());
     setStamp(messages, messages.left->header.stamp + ros::Duration(jump));
-    chain().camera.publish(messages);
-    const auto jumped = chain().refined.wait(messages.left->header.stamp);
-    EXPECT_TRUE(jumped && chain().isOfOnePair(*jumped)) << jump;
-    chain().refined.clear();
+    camera().camera.publish(messages);
+    const auto jumped = refined().wait(messages.left->header.stamp);
+    EXPECT_TRUE(jumped && camera().isOfOnePair(*jumped)) << jump;
+    refined().clear();
     expectRecovery();
 
-    messages = chain().make(nextIndex());
+    messages = camera().make(nextIndex());
     messages.left->header.stamp += ros::Duration(jump);
-    chain().camera.publish(messages);
+    camera().camera.publish(messages);
     expectRecovery();
   }
 }
 
 TEST_P(TimeFault, camerasApartByAMillisecond) {
-  const auto spoil = [this](StereoMessages& messages) {
-    messages = chain().makeApart(rig_->index - 1, 0.001);
-  };
+  const auto spoil = [this](StereoMessages& messages) { messages = makeApart(rig_->index - 1, 0.001); };
   if (isApproximate()) {
     for (int i = 0; i < 5; ++i) {
       const int index = nextIndex();
-      chain().camera.publish(chain().makeApart(index, 0.001));
-      EXPECT_TRUE(chain().arrives(index));
+      camera().camera.publish(makeApart(index, 0.001));
+      EXPECT_TRUE(arrives(index));
     }
   } else {
     expectLog(Log::WARN,
@@ -208,7 +220,7 @@ TEST_P(TimeFault, camerasApartByAMillisecond) {
                 "differ by at least 0.001 s", "set ~approximate_sync to true",
                 "~approximate_sync_max_interval above"}},
               spoil);
-    EXPECT_EQ(chain().refined.count(), 0U);
+    EXPECT_EQ(refined().count(), 0U);
   }
   expectRecovery();
 }
@@ -217,8 +229,8 @@ TEST_P(TimeFault, camerasApartByHalfAPeriodMakeNoPair) {
   expectLog(Log::WARN,
             {{"no synchronized stereo pair", "differ by at least 0.05 s", "follow each other in 0.1 s",
               "trigger both cameras at the same time"}},
-            [this](StereoMessages& messages) { messages = chain().makeApart(rig_->index - 1, 0.05); });
-  EXPECT_EQ(chain().refined.count(), 0U);
+            [this](StereoMessages& messages) { messages = makeApart(rig_->index - 1, 0.05); });
+  EXPECT_EQ(refined().count(), 0U);
   expectRecovery();
 }
 
@@ -241,7 +253,7 @@ TEST_P(TimeFault, cameraThatIsMissingIsReported) {
   for (const auto& [name, spoil] : FAULTS) {
     expectLog(Log::WARN, {{"no synchronized stereo pair", topic(name) + " 0", "a topic without messages"}},
               spoil);
-    EXPECT_EQ(chain().refined.count(), 0U) << name;
+    EXPECT_EQ(refined().count(), 0U) << name;
     expectRecovery();
   }
   // A whole camera.
@@ -258,13 +270,13 @@ TEST_P(TimeFault, camerasThatComeInBursts) {
   for (const int frames : {40, 10, 10}) {
     std::vector<StereoMessages> lefts, rights;
     for (int i = 0; i < frames; ++i) {
-      const StereoMessages messages = chain().make(nextIndex());
+      const StereoMessages messages = camera().make(nextIndex());
       lefts.push_back({messages.left, nullptr, messages.left_info, nullptr});
       rights.push_back({nullptr, messages.right, nullptr, messages.right_info});
     }
-    for (const StereoMessages& messages : lefts) chain().camera.publish(messages);
-    for (const StereoMessages& messages : rights) chain().camera.publish(messages);
-    EXPECT_TRUE(chain().arrives(rig_->index - 1)) << "the newest frame of a burst of " << frames;
+    for (const StereoMessages& messages : lefts) camera().camera.publish(messages);
+    for (const StereoMessages& messages : rights) camera().camera.publish(messages);
+    EXPECT_TRUE(arrives(rig_->index - 1)) << "the newest frame of a burst of " << frames;
     expectRecovery();
   }
 }
