@@ -6,9 +6,14 @@
 #include <ros/console.h>
 #include <stereo_msgs/DisparityImage.h>
 
+#include <chrono>
+#include <condition_variable>
 #include <map>
+#include <mutex>
 #include <set>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "ChainClient.hpp"
 
@@ -18,37 +23,60 @@ namespace {
 using sensor_msgs::Image;
 using stereo_msgs::DisparityImage;
 
+constexpr int FRAMES = 1000;
+
 std::string address(const std::vector<std::uint8_t>& data) {
   std::ostringstream text;
   text << static_cast<const void*>(data.data());
   return text.str();
 }
 
-/// Addresses that the log says were published or received for a topic and stamp, by nodelet.
-class AddressLog {
+/// Addresses that the log says were published or received for a topic and stamp, by nodelet. As long as it
+/// lives, it hears every line of this process.
+class AddressLog : public ros::console::LogAppender {
  public:
-  explicit AddressLog(ros::NodeHandle& nh) : listener_(nh, "/rosout") {}
+  AddressLog() { ros::console::register_appender(this); }
+  ~AddressLog() override { ros::console::deregister_appender(this); }
 
-  /// Waits for a line such as "[/stereo/segmentation] published labels 1000.000000000 at 0x..."
+  /// A line such as "[/stereo/segmentation] published labels 1000.000000000 at 0x..."
+  void log(ros::console::Level /*level*/, const char* text, const char* /*file*/, const char* /*function*/,
+           int /*line*/) override {
+    const std::string line = text;
+    const auto address = line.rfind(AT);
+    if (address == std::string::npos) return;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    addresses_[line.substr(0, address)] = line.substr(address + AT.size());
+    logged_.notify_all();
+  }
+
+  /// Waits for such a line.
   std::string find(const std::string& nodelet, const std::string& what, const std::string& topic,
                    const ros::Time& stamp) {
     std::ostringstream head;
-    head << "[/stereo/" << nodelet << "] " << what << " " << topic << " " << stamp << " at ";
-    const std::string start = head.str();
-    const auto line = listener_.wait(
-        [&start](const rosgraph_msgs::Log& log) { return log.msg.compare(0, start.size(), start) == 0; });
-    return line ? line->msg.substr(start.size()) : "no line '" + start + "'";
+    head << "[/stereo/" << nodelet << "] " << what << " " << topic << " " << stamp;
+    std::unique_lock<std::mutex> lock(mutex_);
+    const bool is_found = logged_.wait_for(lock, std::chrono::duration<double>(TIMEOUT),
+                                           [&] { return addresses_.count(head.str()) > 0; });
+    return is_found ? addresses_[head.str()] : "no line '" + head.str() + "'";
+  }
+
+  void clear() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    addresses_.clear();
   }
 
  private:
-  Listener<rosgraph_msgs::Log> listener_;
+  const std::string AT = " at ";
+  std::mutex mutex_;
+  std::condition_variable logged_;
+  std::map<std::string, std::string> addresses_;
 };
 
 TEST(ZeroCopy, everyEdgePassesThePointer) {
   ros::console::set_logger_level("ros.disparity_refinement", ros::console::levels::Debug);
   ros::console::notifyLoggerLevelsChanged();
   ros::NodeHandle nh;
-  AddressLog log(nh);
+  AddressLog log;
 
   nodelet::Loader loader(nh);
   const std::map<std::string, std::string> remappings;
@@ -62,14 +90,27 @@ TEST(ZeroCopy, everyEdgePassesThePointer) {
   Listener<Image> labels(nh, "labels"), raw_picture(nh, "disparity_color"),
       refined_picture(nh, "disparity_refined_color");
   Listener<Image> labels_picture(nh, "labels_color"), borders(nh, "segment_borders");
-  StereoCamera camera(nh);
+  // Small images: what counts is that there are many of them.
+  StreetParameters street;
+  street.width = 128;
+  street.height = 48;
+  street.focal_length = 80.0;
+  StereoCamera camera(nh, street);
   for (auto* picture : {&raw_picture, &refined_picture, &labels_picture, &borders}) {
     ASSERT_TRUE(camera.waitForChain(*picture));
   }
 
-  for (int i = 0; i < 3; ++i) {
+  std::vector<StreetFrame> drive;
+  for (int i = 0; i < 5; ++i) drive.push_back(camera.street().render(i));
+
+  for (int i = 0; i < FRAMES && !testing::Test::HasFailure(); ++i) {
+    for (auto* listener : {&raw, &refined}) listener->clear();
+    for (auto* listener : {&labels, &raw_picture, &refined_picture, &labels_picture, &borders})
+      listener->clear();
+    log.clear();
     const ros::Time stamp = camera.stamp(i);
-    const StereoMessages sent = camera.make(i);
+    const StreetFrame& frame = drive[i % drive.size()];
+    const StereoMessages sent = camera.make(frame.left, frame.right, stamp);
     camera.publish(sent);
     const auto raw_message = raw.wait(stamp);
     const auto labels_message = labels.wait(stamp);
