@@ -1,7 +1,6 @@
 // Finds the rectified stereo pair of a bag and prints the arguments that make kitti.launch play it, one a
 // line. Usage: bag_arguments BAG
 
-#include <rosbag/bag.h>
 #include <rosbag/view.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
@@ -16,6 +15,7 @@
 #include <vector>
 
 #include "CommandLine.hpp"
+#include "OpenBag.hpp"
 
 namespace {
 
@@ -104,7 +104,8 @@ double stampOffset(const rosbag::Bag& bag, const StereoTopics& topics) {
 }
 
 void printArguments(const std::string& file) {
-  rosbag::Bag bag(file);
+  rosbag::Bag bag;
+  disparity_refinement::openBag(file, bag);
   rosbag::View view(bag);
   const StereoTopics topics = findPair(view);
 
