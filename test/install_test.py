@@ -17,7 +17,7 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
 NODELETS = ("disparity", "segmentation", "plane_refinement", "visualization")
-TOOLS = ("bag_arguments", "evaluate", "influence_surface", "kitti_to_bag", "refine", "render_street")
+TOOLS = ("bag_arguments", "check_bag", "evaluate", "influence_surface", "kitti_to_bag", "refine", "render_street")
 # For a slow machine that does something else, too [s].
 TIMEOUT = 600
 

@@ -1,19 +1,17 @@
 // The programs as a user starts them: arguments, files that they write, errors and exit codes.
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <array>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "KittiFixture.hpp"
+#include "RunTool.hpp"
 #include "disparity_refinement/evaluation/KittiFiles.hpp"
 #include "disparity_refinement/segmentation/Segmentation.hpp"
 
@@ -21,38 +19,6 @@ namespace disparity_refinement {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Outcome {
-  int exit_code = 0;
-  std::string text;  ///< What it wrote to stdout and stderr.
-};
-
-/// Runs a tool of this package, with settings of the environment such as "PATH=/bin".
-Outcome run(const std::string& arguments, const std::string& environment = "") {
-  std::FILE* pipe = popen((environment + " " TOOLS_FOLDER "/" + arguments + " 2>&1").c_str(), "r");
-  if (pipe == nullptr) throw std::runtime_error("popen");
-  Outcome outcome;
-  std::array<char, 4096> buffer{};
-  while (std::fgets(buffer.data(), static_cast<int>(buffer.size()), pipe) != nullptr)
-    outcome.text += buffer.data();
-  const int status = pclose(pipe);
-  outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return outcome;
-}
-
-void expectGood(const std::string& arguments) {
-  const Outcome outcome = run(arguments);
-  EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.text;
-}
-
-/// One line that begins with the tool's name and holds the words.
-void expectError(const std::string& arguments, const std::string& words) {
-  const Outcome outcome = run(arguments);
-  EXPECT_EQ(outcome.exit_code, 1) << arguments;
-  EXPECT_NE(outcome.text.find(words), std::string::npos) << arguments << "\n" << outcome.text;
-  EXPECT_EQ(outcome.text.find(arguments.substr(0, arguments.find(' ')) + ": "), 0U) << outcome.text;
-  EXPECT_EQ(outcome.text.find('\n'), outcome.text.size() - 1) << "one line: " << outcome.text;
-}
 
 std::string readText(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
