@@ -86,21 +86,32 @@ void requireTime(const std_msgs::Header& header, const std::string& topic) {
 }
 
 cv_bridge::CvImageConstPtr grayImage(const sensor_msgs::ImageConstPtr& message, const std::string& topic) {
-  int bytes_per_pixel = 0;
+  int channels = 0, bits = 0;
   try {
-    bytes_per_pixel = enc::numChannels(message->encoding) * enc::bitDepth(message->encoding) / 8;
+    bits = enc::bitDepth(message->encoding);
+    channels = enc::numChannels(message->encoding);
   } catch (const std::exception&) {
+    // Refused below.
+  }
+  // 8UC-1 and 8UC999999999 are taken for encodings there.
+  if (channels < 1 || channels > CV_CN_MAX) {
     refuse(topic, "unknown encoding '", message->encoding,
            "', expected mono8, mono16, bgr8, rgb8, bgra8, rgba8 or a Bayer pattern");
   }
-  checkLayout(*message, bytes_per_pixel, topic);
+  checkLayout(*message, channels * bits / 8, topic);
 
   const bool is_gray = message->encoding == enc::MONO8 || message->encoding == enc::TYPE_8UC1;
+  cv_bridge::CvImageConstPtr gray;
   try {
-    return cv_bridge::toCvShare(message, is_gray ? message->encoding : enc::MONO8);
+    gray = cv_bridge::toCvShare(message, is_gray ? message->encoding : enc::MONO8);
   } catch (const std::exception& e) {
     refuse(topic, "cannot convert encoding '", message->encoding, "' to mono8: ", e.what());
   }
+  // cv_bridge leaves 8SC1 as it is.
+  if (gray->image.type() != CV_8UC1) {
+    refuse(topic, "cannot convert encoding '", message->encoding, "' to mono8: it is no colour format");
+  }
+  return gray;
 }
 
 sensor_msgs::ImagePtr makeImage(const std_msgs::Header& header, const cv::Size& size,
@@ -153,8 +164,9 @@ stereo_msgs::DisparityImagePtr makeDisparityImage(const std_msgs::Header& header
 }
 
 DisparityRange disparityRange(const stereo_msgs::DisparityImage& message, const std::string& topic) {
-  if (!std::isfinite(message.min_disparity)) {
-    refuse(topic, "min_disparity is ", message.min_disparity, ", expected a finite value");
+  if (!std::isfinite(message.min_disparity) || !(message.min_disparity - 1.0F < message.min_disparity)) {
+    refuse(topic, "min_disparity is ", message.min_disparity,
+           ", expected a finite value, of less than 2^24 in size");
   }
   const cv::Mat map = imageView(message.image, enc::TYPE_32FC1, topic);
   DisparityRange range;

@@ -127,6 +127,13 @@ TEST(GrayImage, refusesWhatItCannotRead) {
                  "left: ", "'32FC1'");
 
   EXPECT_REFUSED(grayImage(boost::make_shared<sensor_msgs::Image>(), "left"), "left: ", "encoding ''");
+  for (const std::string encoding : {"64FC999999999", "8UC-1", "8UC513"}) {
+    message->encoding = encoding;
+    EXPECT_REFUSED(grayImage(message, "left"), "left: ", "unknown encoding '" + encoding + "'");
+  }
+  // cv_bridge passes it on as signed values.
+  EXPECT_REFUSED(grayImage(image(enc::TYPE_8SC1, cv::Mat(3, 5, CV_8SC1, cv::Scalar(1))), "left"),
+                 "left: ", "'8SC1'");
   message = image(enc::MONO8, pixels);
   message->width = 0;
   EXPECT_REFUSED(grayImage(message, "left"), "left: ", "empty (0x3)");
@@ -273,7 +280,8 @@ TEST(DisparityRangeOfMessage, isNotEmptyForAMapWithoutDisparity) {
 
 TEST(DisparityRangeOfMessage, refusesAMinimumThatIsNotFinite) {
   const auto message = disparityImage();
-  for (const float min : {NOT_A_NUMBER, INFINITE, -INFINITE}) {
+  // From 2^24 on min - 1, the invalid value, may be min itself.
+  for (const float min : {NOT_A_NUMBER, INFINITE, -INFINITE, -16777216.0F, 1e30F}) {
     message->min_disparity = min;
     EXPECT_REFUSED(disparityRange(*message, "disparity"), "disparity: ", "min_disparity");
   }
