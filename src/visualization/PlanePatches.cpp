@@ -66,11 +66,13 @@ class PlaneInSpace {
     return -away / cv::norm(away);
   }
 
-  /// The point seen at a pixel; none where the disparity is too small.
+  /// The point seen at a pixel; none where the disparity is too small, or a coordinate too large.
   std::optional<cv::Point3d> point(double x, double y) const {
     const double d = plane_.a * x + (plane_.b * y + plane_.c);
     if (!(d >= MIN_PATCH_DISPARITY) || !std::isfinite(d)) return std::nullopt;
-    return cv::Point3d((x - c_.x) * t_ / d, (y - c_.y) * t_ / d, f_ * t_ / d);
+    const cv::Point3d point((x - c_.x) * t_ / d, (y - c_.y) * t_ / d, f_ * t_ / d);
+    if (!std::isfinite(cv::norm(point))) return std::nullopt;
+    return point;
   }
 
  private:
@@ -99,7 +101,8 @@ std::vector<PlanePatch> findPlanePatches(const cv::Mat& labels, const std::vecto
       if (seen) point = *seen;
       return seen.has_value();
     };
-    bool is_seen = put(centroid, patch.centre);
+    // Slopes of 1e200, as another node may publish them, leave no normal.
+    bool is_seen = cv::norm(patch.normal) > 0.5 && put(centroid, patch.centre);
     const auto ellipse = ellipseOf(m);
     for (std::size_t i = 0; i < ellipse.size(); ++i) {
       is_seen = is_seen && put(centroid + ellipse[i], patch.corners[i]);

@@ -166,6 +166,17 @@ TEST(PlanePatches, leaveOutWhatIsNoPlane) {
   EXPECT_TRUE(findPlanePatches(labels, {plane}, GEOMETRY, PRINCIPAL_POINT).empty());
 }
 
+TEST(PlanePatches, areFinite) {
+  SegmentPlane plane;
+  plane.status = PlaneStatus::ACCEPTED;
+  plane.c = 10.0;
+  const cv::Mat labels = oneSegment({100, 100, 50, 50});
+  EXPECT_EQ(findPlanePatches(labels, {plane}, GEOMETRY, PRINCIPAL_POINT).size(), 1U);
+  EXPECT_TRUE(findPlanePatches(labels, {plane}, GEOMETRY, {1e300, 0.0}).empty());
+  plane.a = 1e200;
+  EXPECT_TRUE(findPlanePatches(labels, {plane}, GEOMETRY, PRINCIPAL_POINT).empty());
+}
+
 TEST(PlanePatches, findTheRoadOfTheStreet) {
   const SyntheticStreet street;
   const StreetParameters& parameters = street.parameters();

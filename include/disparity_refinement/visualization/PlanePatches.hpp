@@ -27,7 +27,8 @@ struct PlanePatch {
 
 /// The patch of every segment with a plane, its own or a neighbour's, in order of the labels. Segments of
 /// less than MIN_PATCH_PIXELS are left out, and patches of which a corner has a disparity below
-/// MIN_PATCH_DISPARITY: they would hide the others, or reach beyond the horizon.
+/// MIN_PATCH_DISPARITY: they would hide the others, or reach beyond the horizon. So are planes so steep or so
+/// far that they are not finite in space: rviz would refuse all.
 ///
 /// @param labels           CV_32SC1, 0 ... planes.size() - 1; negative labels belong to no segment.
 /// @param planes           Plane of every label.
