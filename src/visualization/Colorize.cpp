@@ -46,8 +46,8 @@ void colorizeDisparity(const cv::Mat& disparity, const DisparityRange& range, fl
                        float scale_max, cv::Mat& bgr) {
   requireImage(disparity, "disparity", CV_32FC1);
   requireArgument(std::isfinite(scale_min), "scale_min", scale_min, "a finite number");
-  requireArgument(std::isfinite(scale_max) && scale_max > scale_min, "scale_max", scale_max,
-                  "greater than scale_min, " + std::to_string(scale_min));
+  requireArgument(std::isfinite(scale_max - scale_min) && scale_max > scale_min, "scale_max", scale_max,
+                  "greater than scale_min, " + std::to_string(scale_min) + ", by a finite difference");
   const cv::Mat table = colourTable(cv::COLORMAP_TURBO);
   const cv::Vec3b* colours = table.ptr<cv::Vec3b>();
   bgr.create(disparity.size(), CV_8UC3);

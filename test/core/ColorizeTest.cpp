@@ -75,6 +75,7 @@ TEST(ColorizeDisparity, refusesAnEmptyScale) {
   EXPECT_THROW(colorizeDisparity(disparity, range, NOT_A_NUMBER, 8.0F, bgr), std::invalid_argument);
   EXPECT_THROW(colorizeDisparity(disparity, range, 8.0F, INFINITE, bgr), std::invalid_argument);
   EXPECT_THROW(colorizeDisparity(disparity, range, 8.0F, NOT_A_NUMBER, bgr), std::invalid_argument);
+  EXPECT_THROW(colorizeDisparity(disparity, range, -3e38F, 3e38F, bgr), std::invalid_argument);
   EXPECT_NO_THROW(colorizeDisparity(disparity, range, 8.0F, 8.5F, bgr));
 }
 

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <stdexcept>
 
+#include "disparity_refinement/visualization/Panels.hpp"
 #include "disparity_refinement/visualization/RefinementPicture.hpp"
 
 namespace disparity_refinement {
@@ -53,6 +55,23 @@ TEST(RefinementPicture, refusesImagesOfDifferentSize) {
   picture = smallPicture();
   picture.labels = cv::Mat();
   EXPECT_THROW(drawRefinement(picture), std::invalid_argument);
+}
+
+TEST(Panels, refusesWhatIsNoPicture) {
+  const Panel good{"good", cv::Mat(10, 20, CV_8UC1, cv::Scalar(1))};
+  const int sizes[] = {10, 20, 2};
+  for (const cv::Mat& bad : {cv::Mat(), cv::Mat(10, 20, CV_16UC1), cv::Mat(3, sizes, CV_8UC1)}) {
+    EXPECT_THROW(arrangePanels({{"bad", bad}}, 1), std::invalid_argument);
+    EXPECT_THROW(arrangePanels({good, {"bad", bad}}, 2), std::invalid_argument);
+  }
+  EXPECT_THROW(arrangePanels({good, {"low", cv::Mat(9, 20, CV_8UC1)}}, 2), std::invalid_argument);
+}
+
+TEST(Panels, needsNoMoreColumnsThanPanels) {
+  const Panel panel{"a", cv::Mat(10, 20, CV_8UC1, cv::Scalar(1))};
+  const cv::Size size = arrangePanels({panel, panel}, 2).size();
+  EXPECT_EQ(arrangePanels({panel, panel}, 3).size(), size);
+  EXPECT_EQ(arrangePanels({panel, panel}, std::numeric_limits<int>::max()).size(), size);
 }
 
 }  // namespace

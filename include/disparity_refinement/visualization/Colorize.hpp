@@ -18,7 +18,7 @@ namespace disparity_refinement {
 /// The scale is an argument and not the extent of the frame, so that the colours of two frames mean the same.
 ///
 /// @param disparity  CV_32FC1 [px]; valid where finite and range.isValid.
-/// @throws std::invalid_argument  unless scale_min < scale_max, both finite.
+/// @throws std::invalid_argument  unless scale_min < scale_max, both and their difference finite.
 void colorizeDisparity(const cv::Mat& disparity, const DisparityRange& range, float scale_min,
                        float scale_max, cv::Mat& bgr);
 
