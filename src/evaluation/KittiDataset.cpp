@@ -88,6 +88,8 @@ bool parseDate(const std::string& line, std::int64_t& time) {
                   &date.tm_hour, &date.tm_min, &date.tm_sec, &end) != 6) {
     return false;
   }
+  // What a ros::Time holds, in years.
+  if (date.tm_year < 1970 || date.tm_year > 2105) return false;
   date.tm_year -= 1900;
   date.tm_mon -= 1;
   std::tm normalized = date;
@@ -269,8 +271,8 @@ std::vector<KittiFrame> openBenchmark(const fs::path& folder, const CameraNames&
 
 KittiDataset openKittiDataset(const std::string& folder, KittiCameras cameras, double benchmark_rate,
                               std::vector<IncompleteKittiFrame>* incomplete) {
-  requireArgument(benchmark_rate > 0.0 && std::isfinite(benchmark_rate), "benchmark_rate", benchmark_rate,
-                  "a positive number");
+  requireArgument(benchmark_rate >= 1e-3 && benchmark_rate <= 1e6, "benchmark_rate", benchmark_rate,
+                  "0.001 ... 1000000");
   const fs::path path(folder);
   if (!fs::is_directory(path)) fail(path, "no such folder");
   const CameraNames camera = cameras == KittiCameras::GRAY ? CameraNames{"0", "1"} : CameraNames{"2", "3"};

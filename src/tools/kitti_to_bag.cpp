@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
         "start", po::value(&options.start)->default_value(options.start), "first frame")(
         "frames", po::value(&options.frames)->default_value(options.frames), "number of frames, 0: all")(
         "rate", po::value(&options.rate)->default_value(options.rate),
-        "frames per second of a stereo benchmark folder")(
+        "frames per second of a stereo benchmark folder, 0.001 ... 1000000")(
         "original-stamps",
         "give the right images of a raw drive their own times instead of the left ones: needs "
         "approximate synchronization")("force", "overwrite OUTPUT.bag");

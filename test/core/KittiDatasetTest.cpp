@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
@@ -248,7 +249,8 @@ TEST(KittiDataset, datesAreReadStrictly) {
   const std::string second = "\n2011-09-26 13:02:26.068000000\n";
   for (const std::string bad :
        {"13:02:25.9", "2011-13-26 13:02:25.9", "2011-02-30 13:02:25.9", "2011-09-26 25:02:25.9",
-        "2011-09-26 13:02:25,9", "2011-09-26 13:02:25.9x", "2011-09-26 13:02:25.1234567890"}) {
+        "2011-09-26 13:02:25,9", "1969-09-26 13:02:25.9", "2262-09-26 13:02:25.9", "9027-09-26 13:02:25.9",
+        "2011-09-26 13:02:25.9x", "2011-09-26 13:02:25.1234567890"}) {
     writeText(times, bad + second);
     expectError(errorOf(drive), times, "line 1 is \"" + bad + "\"");
   }
@@ -262,8 +264,12 @@ TEST(KittiDataset, datesAreReadStrictly) {
 TEST(KittiDataset, aRateMustBePositive) {
   const TemporaryFolder folder;
   writeBenchmark(folder / "training");
-  EXPECT_THROW(openKittiDataset((folder / "training").string(), KittiCameras::GRAY, 0.0),
-               std::invalid_argument);
+  // Neither the largest time nor the difference of two of them gets lost.
+  for (const double rate : {0.0, -1.0, 1e-12, 1e300, std::nan("")}) {
+    EXPECT_THROW(openKittiDataset((folder / "training").string(), KittiCameras::GRAY, rate),
+                 std::invalid_argument)
+        << rate;
+  }
 }
 
 }  // namespace

@@ -27,8 +27,8 @@ struct KittiFrame {
   std::string name;                ///< File name without its extension.
   std::string left, right;         ///< Image files.
   std::string disp_noc, disp_occ;  ///< Ground truth of the gray left image; empty where the dataset has none.
-  std::int64_t left_stamp = 0;     ///< [ns since 1970-01-01 UTC]
-  std::int64_t right_stamp = 0;    ///< [ns since 1970-01-01 UTC]
+  std::int64_t left_stamp = 0;     ///< [ns since 1970-01-01 UTC], > 0, before 2106
+  std::int64_t right_stamp = 0;    ///< [ns since 1970-01-01 UTC], > 0, before 2106
   ProjectionMatrix left_projection{}, right_projection{};
 };
 
@@ -48,7 +48,7 @@ struct KittiDataset {
 /// The times of an odometry sequence start at 0 and the benchmark has none. Both are set at the beginning of
 /// 2011-09-26 UTC, the day of KITTI's first drive, since ROS takes a time of 0 for "unknown".
 ///
-/// @param benchmark_rate  Frames of a STEREO_BENCHMARK per second, > 0.
+/// @param benchmark_rate  Frames of a STEREO_BENCHMARK per second, 0.001...1000000.
 /// @param incomplete  If given, the frames of a STEREO_BENCHMARK that lack a file are told here and left out;
 ///                    without it the first one throws.
 /// Throws std::runtime_error that names the file and what was expected if one is missing or does not fit to
