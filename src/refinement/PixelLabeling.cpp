@@ -416,7 +416,8 @@ void PixelLabeling::choose(const cv::Mat& measured, const DisparityRange& range,
           total += weights_[dearer];
           weighted += weights_[dearer] * static_cast<float>(candidate[i]);
         }
-        out[x] = range.min + weighted / total / STEPS;
+        // A step may round beyond the range; what was measured beyond it stays.
+        out[x] = std::min(range.min + weighted / total / STEPS, std::max(range.max, d[x]));
       }
     }
   });

@@ -236,7 +236,8 @@ class Straightforward {
       total += weight;
       weighted += weight * candidates[i].disparity;
     }
-    return static_cast<float>(scene_.range.min + weighted / total / 16.0);
+    return std::min(static_cast<float>(scene_.range.min + weighted / total / 16.0),
+                    std::max(scene_.range.max, scene_.measured.at<float>(pixel)));
   }
 
   const PlaneScene& scene_;

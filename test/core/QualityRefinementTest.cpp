@@ -489,6 +489,18 @@ TEST(QualityRefinement, refinesWithinTheRange) {
   }
 }
 
+TEST(QualityRefinement, doesNotRoundBeyondTheRange) {
+  // The largest disparity lies between two steps of 1/16 px.
+  const DisparityRange range{0.0F, 10.04F};
+  Frame frame({40, 30});
+  frame.disparity.setTo(range.max);
+  frame.disparity.colRange(10, 20).setTo(range.invalid());
+  double largest = 0.0;
+  cv::minMaxLoc(refine(frame, {}, range), nullptr, &largest);
+  EXPECT_LE(largest, range.max);
+  EXPECT_GT(largest, 10.0);
+}
+
 TEST(QualityRefinement, movesWithTheRange) {
   // The same scene 64 px lower, and the range too. What the right camera sees is another matter.
   const Frame frame = randomFrame({97, 61}, 10);
