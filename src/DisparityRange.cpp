@@ -1,11 +1,23 @@
 #include "disparity_refinement/DisparityRange.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <string>
 
+#include "disparity_refinement/arguments.hpp"
 #include "disparity_refinement/strips.hpp"
 
 namespace disparity_refinement {
+
+void validate(const DisparityRange& range) {
+  requireArgument(std::isfinite(range.min) && range.invalid() < range.min, "range.min", range.min,
+                  "a finite number, of less than 2^24 in size");
+  if (!(std::isfinite(range.max) && range.max >= range.min)) {
+    requireArgument(false, "range.max", range.max,
+                    "a finite number, at least range.min, " + std::to_string(range.min));
+  }
+}
 
 void copyValid(const cv::Mat& disparity, const DisparityRange& range, cv::Mat& copy) {
   copy.create(disparity.size(), CV_32FC1);

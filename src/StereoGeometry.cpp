@@ -28,10 +28,10 @@ StereoGeometry stereoGeometry(const ProjectionMatrix& left, const ProjectionMatr
          << left[0] << " is not positive: P_right[3] should be -f * T; are left and right swapped?";
     throw std::invalid_argument(text.str());
   }
-  if (!std::isfinite(geometry.principal_point_offset)) {
+  if (!(std::abs(geometry.principal_point_offset) <= MAX_PRINCIPAL_POINT_OFFSET)) {
     std::ostringstream text;
     text << "the principal points P[2] are " << left[2] << " (left) and " << right[2]
-         << " (right), expected finite values";
+         << " (right), expected finite values at most " << MAX_PRINCIPAL_POINT_OFFSET << " px apart";
     throw std::invalid_argument(text.str());
   }
   return geometry;

@@ -20,6 +20,10 @@ struct DisparityRange {
   bool isValid(float d) const { return d >= min && d <= std::numeric_limits<float>::max(); }
 };
 
+/// Throws std::invalid_argument that names range.min or range.max unless both are finite, max is at least
+/// min, and the invalid value is less than min: from 2^24 on floats are too coarse for that.
+void validate(const DisparityRange& range);
+
 /// Copies a map; whatever is no disparity, NaN and infinity too, becomes range.invalid().
 ///
 /// @param disparity  CV_32FC1.

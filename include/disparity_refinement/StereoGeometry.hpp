@@ -15,7 +15,11 @@ struct StereoGeometry {
   double principal_point_offset = 0.0;  ///< cx_left - cx_right [px]; not 0 on a verged rig
 };
 
-/// Throws std::invalid_argument that names the entries if f <= 0, T <= 0 or a principal point is not finite.
+/// Largest principal_point_offset, in size [px]: beyond it disparities in single precision are too coarse.
+constexpr double MAX_PRINCIPAL_POINT_OFFSET = 1e6;
+
+/// Throws std::invalid_argument that names the entries if f <= 0, T <= 0, or if the principal points are not
+/// finite or too far apart.
 StereoGeometry stereoGeometry(const ProjectionMatrix& left, const ProjectionMatrix& right);
 
 }  // namespace disparity_refinement

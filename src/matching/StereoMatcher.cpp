@@ -1,9 +1,11 @@
 #include "disparity_refinement/matching/StereoMatcher.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <tuple>
 
+#include "disparity_refinement/StereoGeometry.hpp"
 #include "disparity_refinement/arguments.hpp"
 
 namespace disparity_refinement {
@@ -207,6 +209,10 @@ void StereoMatcher::compute(const cv::Mat& left, const cv::Mat& right, cv::Mat& 
                             double principal_point_offset) {
   requireImage(left, "left", CV_8UC1);
   requireImage(right, "right", CV_8UC1, left.size());
+  if (!(std::abs(principal_point_offset) <= MAX_PRINCIPAL_POINT_OFFSET)) {
+    requireArgument(false, "principal_point_offset", principal_point_offset,
+                    "at most " + std::to_string(MAX_PRINCIPAL_POINT_OFFSET) + " in size");
+  }
   const cv::Size size = left.size();
   const cv::Range matched = parameters_.stereo_algorithm == StereoAlgorithm::CENSUS_SGM
                                 ? matchCensus(left, right)

@@ -157,11 +157,7 @@ void PlaneRefinement::refine(const cv::Mat& disparity, const cv::Mat& labels, co
                              cv::Mat& refined) {
   requireImage(disparity, "disparity", CV_32FC1);
   requireImage(labels, "labels", CV_32SC1, disparity.size());
-  requireArgument(std::isfinite(range.min), "range.min", range.min, "a finite number");
-  if (!(std::isfinite(range.max) && range.max >= range.min)) {
-    requireArgument(false, "range.max", range.max,
-                    "a finite number, at least range.min, " + std::to_string(range.min));
-  }
+  validate(range);
   requireArgument(focal_length_times_baseline > 0.0 && std::isfinite(focal_length_times_baseline),
                   "focal_length_times_baseline", focal_length_times_baseline, "greater than 0");
   validate(parameters);

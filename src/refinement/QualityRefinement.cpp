@@ -111,9 +111,7 @@ void QualityRefinement::refine(const cv::Mat& disparity, const cv::Mat& labels, 
   requireImage(disparity, "disparity", CV_32FC1);
   requireImage(labels, "labels", CV_32SC1, disparity.size());
   requireImage(gray, "gray", CV_8UC1, disparity.size());
-  requireArgument(std::isfinite(range.min), "range.min", range.min, "a finite number");
-  requireArgument(std::isfinite(range.max) && range.max >= range.min, "range.max", range.max,
-                  "a finite number, at least range.min");
+  validate(range);
   validate(fit);
   validate(parameters);
   for (const cv::Mat* input : {&disparity, &labels, &gray}) {

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <stdexcept>
 
 #include "disparity_refinement/DisparityRange.hpp"
 
@@ -22,6 +23,21 @@ TEST(DisparityRange, onlyTheMinimumAndAboveAreValid) {
   EXPECT_FALSE(range.isValid(1.99F));
   EXPECT_FALSE(range.isValid(-std::numeric_limits<float>::infinity()));
   EXPECT_FALSE(range.isValid(std::numeric_limits<float>::quiet_NaN()));
+}
+
+TEST(DisparityRange, hasRoomForTheInvalidValue) {
+  const float coarse = 16777216.0F, not_a_number = std::numeric_limits<float>::quiet_NaN(),
+              infinite = std::numeric_limits<float>::infinity();
+  ASSERT_EQ(-coarse - 1.0F, -coarse);
+  EXPECT_NO_THROW(validate({-coarse + 1.0F, coarse}));
+  EXPECT_NO_THROW(validate({coarse, coarse}));
+  EXPECT_NO_THROW(validate({5.0F, 5.0F}));
+  for (const float min : {-coarse, coarse + 4.0F, -1e30F, 1e30F, not_a_number, infinite, -infinite}) {
+    EXPECT_THROW(validate({min, 2e30F}), std::invalid_argument) << min;
+  }
+  for (const float max : {4.0F, not_a_number, infinite, -infinite}) {
+    EXPECT_THROW(validate({5.0F, max}), std::invalid_argument) << max;
+  }
 }
 
 TEST(KeepOneInvalid, invalidatesTheTopLeftPixelOfAFullMapOnly) {

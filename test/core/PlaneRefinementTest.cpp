@@ -643,6 +643,9 @@ TEST(PlaneRefinement, refusesABadRangeOrBaseline) {
   expectMessage(refine({0.0F, -1.0F}, 388.0),
                 "range.max is -1, expected a finite number, at least range.min, 0");
   expectMessage(refine({NOT_A_NUMBER, 64.0F}, 388.0), "range.min is nan");
+  // min - 1 is min.
+  expectMessage(refine({-1e9F, 64.0F}, 388.0),
+                "range.min is -1e+09, expected a finite number, of less than 2^24");
   expectMessage(refine({0.0F, INFINITE}, 388.0), "range.max is inf");
 }
 

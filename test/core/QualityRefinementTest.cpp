@@ -695,6 +695,7 @@ TEST(QualityRefinement, refusesABadRange) {
   const auto refineIn = [&](const DisparityRange& range) { return [&, range] { refine(frame, {}, range); }; };
   expectMessage(refineIn({NOT_A_NUMBER, 64.0F}), "range.min is nan");
   expectMessage(refineIn({-INFINITE, 64.0F}), "range.min is -inf");
+  expectMessage(refineIn({-1e9F, 64.0F}), "range.min is -1e+09");
   expectMessage(refineIn({0.0F, INFINITE}), "range.max is inf");
   expectMessage(refineIn({0.0F, NOT_A_NUMBER}), "range.max is nan");
   expectMessage(refineIn({0.0F, -1.0F}), "range.max is -1, expected a finite number, at least range.min");

@@ -284,6 +284,24 @@ TEST(StereoMatcher, subtractsThePrincipalPointOffset) {
   }
 }
 
+TEST(StereoMatcher, refusesPrincipalPointsThatAreFarApart) {
+  const StereoPair pair = texturedPair({240, 60}, 24);
+  for (const Method& method : METHODS) {
+    StereoMatcher matcher(parametersOf(method));
+    cv::Mat disparity;
+    for (const double offset : {1e7, -1e30, 1e300, std::nan(""), static_cast<double>(INFINITY)}) {
+      EXPECT_THROW(matcher.compute(pair.left, pair.right, disparity, offset), std::invalid_argument)
+          << method << " " << offset;
+    }
+    matcher.compute(pair.left, pair.right, disparity, -1e6);
+    const DisparityRange range = matcher.range(-1e6);
+    EXPECT_GT(cv::countNonZero(disparity == range.invalid()), 0) << method;
+    EXPECT_EQ(cv::countNonZero((disparity >= range.min) & (disparity <= range.max)),
+              static_cast<int>(disparity.total()) - cv::countNonZero(disparity == range.invalid()))
+        << method;
+  }
+}
+
 TEST(StereoMatcher, everyPixelIsInvalidOrInRange) {
   StereoPair noise{cv::Mat(60, 200, CV_8UC1), cv::Mat(60, 200, CV_8UC1)};
   cv::RNG rng(3);

@@ -85,6 +85,16 @@ TEST(StereoGeometry, refusesAFocalLengthThatIsNotPositive) {
   EXPECT_NE(text.find("0 (left) and 400 (right)"), std::string::npos) << text;
 }
 
+TEST(StereoGeometry, refusesPrincipalPointsThatAreFarApart) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double cx : {nan, 1e7, -1e300}) {
+    EXPECT_NE(refusal(cameraInfo(400, cx, 0), cameraInfo(400, 320, -200)).find("P[2]"), std::string::npos)
+        << cx;
+    EXPECT_NE(refusal(cameraInfo(400, 320, 0), cameraInfo(400, cx, -200)).find("P[2]"), std::string::npos)
+        << cx;
+  }
+}
+
 TEST(StereoGeometry, refusesABaselineThatIsNotPositive) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const double tx : {0.0, 200.0, nan}) {

@@ -92,8 +92,10 @@ class StereoMatcher {
   /// @param left, right             CV_8UC1, of the same size.
   /// @param disparity               CV_32FC1 [px], at least one pixel invalid; written in place if it has
   ///                                that type and size already.
-  /// @param principal_point_offset  cx_left - cx_right [px], subtracted from every disparity.
-  /// @throws std::invalid_argument  for images of another type, of different size, empty, or too small.
+  /// @param principal_point_offset  cx_left - cx_right [px], subtracted from every disparity; at most
+  ///                                MAX_PRINCIPAL_POINT_OFFSET in size.
+  /// @throws std::invalid_argument  for images of another type, of different size, empty, or too small, and
+  ///                                for a larger offset.
   void compute(const cv::Mat& left, const cv::Mat& right, cv::Mat& disparity,
                double principal_point_offset = 0.0);
 
