@@ -18,7 +18,17 @@ std::vector<SegmentationParameters> furtherSegmentations(int number) {
   return segmentations;
 }
 
+namespace {
+
+void validate(RefinementMode mode) {
+  requireArgument(mode == RefinementMode::PAPER || mode == RefinementMode::QUALITY, "refinement_mode",
+                  static_cast<int>(mode), "0 (paper) or 1 (quality)");
+}
+
+}  // namespace
+
 void validate(const RefinementParameters& parameters) {
+  validate(parameters.mode);
   validate(parameters.planes);
   validate(parameters.quality);
 }
@@ -26,6 +36,7 @@ void validate(const RefinementParameters& parameters) {
 void DisparityRefinement::refine(const cv::Mat& disparity, const cv::Mat& labels, const cv::Mat& gray,
                                  const DisparityRange& range, double focal_length_times_baseline,
                                  const RefinementParameters& parameters, cv::Mat& refined) {
+  validate(parameters.mode);
   if (parameters.mode == RefinementMode::PAPER) {
     paper_.refine(disparity, labels, range, focal_length_times_baseline, parameters.planes, refined);
   } else {

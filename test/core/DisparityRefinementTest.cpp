@@ -94,5 +94,17 @@ TEST(DisparityRefinement, validatesBothSetsOfParameters) {
   EXPECT_THROW(validate(parameters), std::invalid_argument);
 }
 
+TEST(DisparityRefinement, refusesAnUnknownMode) {
+  const Scene scene;
+  RefinementParameters parameters;
+  parameters.mode = static_cast<RefinementMode>(2);
+  EXPECT_THROW(validate(parameters), std::invalid_argument);
+  cv::Mat refined;
+  EXPECT_THROW(DisparityRefinement().refine(scene.disparity, scene.labels, scene.gray, RANGE, F_TIMES_T,
+                                            parameters, refined),
+               std::invalid_argument);
+  EXPECT_TRUE(refined.empty());
+}
+
 }  // namespace
 }  // namespace disparity_refinement

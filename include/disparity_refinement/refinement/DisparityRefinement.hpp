@@ -39,7 +39,8 @@ class DisparityRefinement {
   /// @param disparity, labels, range, refined  See PlaneRefinement and QualityRefinement.
   /// @param gray                               CV_8UC1, the left image. Not looked at in mode PAPER.
   /// @param focal_length_times_baseline        f * T [px * m], > 0. Not looked at in mode QUALITY.
-  /// @throws std::invalid_argument             As the refinement that is made; `refined` is not touched then.
+  /// @throws std::invalid_argument             For an unknown mode, and as the refinement that is made;
+  ///                                           `refined` is not touched then.
   void refine(const cv::Mat& disparity, const cv::Mat& labels, const cv::Mat& gray,
               const DisparityRange& range, double focal_length_times_baseline,
               const RefinementParameters& parameters, cv::Mat& refined);
