@@ -10,6 +10,7 @@
 #include "CommandLine.hpp"
 #include "Evaluation.hpp"
 #include "EvaluationReport.hpp"
+#include "FrameSelection.hpp"
 #include "OutputFiles.hpp"
 #include "disparity_refinement/arguments.hpp"
 
@@ -32,57 +33,6 @@ std::vector<std::string> split(const std::string& text, char separator) {
   for (std::string part; std::getline(stream, part, separator);) parts.push_back(part);
   return parts;
 }
-
-/// Frames by a list of numbers and ranges such as "0,4,100-120"; all for an empty list.
-class FrameSelection {
- public:
-  explicit FrameSelection(const std::string& list) {
-    for (const std::string& part : split(list, ',')) {
-      const auto dash = part.find('-');
-      const int first = parseNumber(part.substr(0, dash), list);
-      const int last = dash == std::string::npos ? first : parseNumber(part.substr(dash + 1), list);
-      ranges_.push_back({first, last, part});
-    }
-    requireArgument(list.empty() || !ranges_.empty(), "frames", list, EXPECTED);
-  }
-
-  bool has(const std::string& frame) const {
-    return ranges_.empty() ||
-           std::any_of(ranges_.begin(), ranges_.end(), [&](const Range& range) { return range.has(frame); });
-  }
-
-  /// Throws unless every part of the list is the number of a frame.
-  void requireFrames(const std::vector<std::string>& frames) const {
-    for (const Range& range : ranges_) {
-      const bool found =
-          std::any_of(frames.begin(), frames.end(), [&](const auto& frame) { return range.has(frame); });
-      requireArgument(found, "frames", range.text,
-                      "numbers of frames, which are " + std::to_string(numberOf(frames.front())) + " ... " +
-                          std::to_string(numberOf(frames.back())) + " here");
-    }
-  }
-
- private:
-  static constexpr const char* EXPECTED = "numbers and ranges such as 0,4,100-120";
-
-  struct Range {
-    int first, last;
-    std::string text;
-
-    bool has(const std::string& frame) const { return numberOf(frame) >= first && numberOf(frame) <= last; }
-  };
-
-  static int numberOf(const std::string& frame) { return std::atoi(frame.c_str()); }
-
-  static int parseNumber(const std::string& text, const std::string& list) {
-    const bool is_number =
-        !text.empty() && text.size() < 9 && text.find_first_not_of("0123456789") == std::string::npos;
-    requireArgument(is_number, "frames", list, EXPECTED);
-    return std::stoi(text);
-  }
-
-  std::vector<Range> ranges_;
-};
 
 /// The frames to score, and in `left_out` what is wrong with the others that were selected.
 std::vector<KittiFrame> openFrames(const std::string& folder, bool with_images,
