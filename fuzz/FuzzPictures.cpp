@@ -44,8 +44,8 @@ void testColours(Input& input) {
   const float most = input.oneIn(3) ? input.anyNumber<float>() : range.max;
   if (succeeds([&] { colorizeDisparity(map.mat(), range, least, most, bgr.mat()); })) {
     requirePicture(bgr.mat(), map.mat());
-    for (int y = 0; y < size.height; ++y) {
-      for (int x = 0; x < size.width; ++x) {
+    for (int y = 0; y < map.mat().rows; ++y) {
+      for (int x = 0; x < map.mat().cols; ++x) {
         const bool is_black = bgr.mat().at<cv::Vec3b>(y, x) == cv::Vec3b(0, 0, 0);
         require(is_black != range.isValid(map.mat().at<float>(y, x)), "black is what is invalid");
       }
