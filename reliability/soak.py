@@ -69,6 +69,14 @@ def plane_refinement():
     ])
 
 
+# What takes most memory: buffers are kept between frames.
+LARGEST = {
+    "disparity": {"sgbm_mode": 1, "min_disparity": 0, "disparity_range": 160, "full_width": True},
+    "segmentation": {"lambda": 0, "h": 0},
+    "plane_refinement": {"refinement_mode": 1, "further_segmentations": 2},
+}
+
+
 class Chain:
     """The running chain, seen from outside."""
 
@@ -154,6 +162,12 @@ def soak(seconds, rate, folder, port):
             samples.append(resident_megabytes(pid))
         return max(samples[len(samples) // 2:])
 
+    def fill_buffers(some_seconds):
+        for algorithm in range(3):
+            for nodelet, values in LARGEST.items():
+                chain.change(nodelet, dict(values, stereo_algorithm=algorithm) if nodelet == "disparity" else values)
+            time.sleep(some_seconds / 3.0)
+
     def change_for(some_seconds):
         nonlocal changes
         begin, before = time.time(), changes
@@ -172,7 +186,8 @@ def soak(seconds, rate, folder, port):
     if seconds <= 2.0 * WARM_UP:
         change_for(seconds)
     else:
-        change_for(WARM_UP)
+        fill_buffers(0.5 * WARM_UP)
+        change_for(0.5 * WARM_UP)
         settled.append(settled_memory())
         for part in range(PARTS):
             change_for((seconds - WARM_UP) / PARTS)
