@@ -71,13 +71,13 @@ class DepthNodelet : public LazyNodelet {
   }
 
   void process(const Disparity& in) {
-    const ros::WallTime begin = ros::WallTime::now();
+    const ros::SteadyTime begin = ros::SteadyTime::now();
     const std::string topic = getNodeHandle().resolveName("disparity_refined");
     monitor_->traceReceived("disparity_refined", in.header.stamp, in.image.data.data());
     const cv::Mat disparity = imageView(in.image, sensor_msgs::image_encodings::TYPE_32FC1, topic);
     const auto depth =
         depthImage(in.header, disparity, disparityRange(in, topic), disparityGeometry(in, topic));
-    monitor_->published(in.header.stamp, (ros::WallTime::now() - begin).toSec() * 1e3);
+    monitor_->published(in.header.stamp, (ros::SteadyTime::now() - begin).toSec() * 1e3);
     monitor_->tracePublished("depth/image_rect", in.header.stamp, depth->data.data());
     publishInfo(in);
     depth_publisher_.publish(depth);

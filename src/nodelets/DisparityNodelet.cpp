@@ -46,7 +46,7 @@ class DisparityNodelet : public LazyNodelet {
     flow_control_ = std::make_unique<FlowControl>(max_frames, cv::getNumThreads());
     worker_ = std::make_unique<FrameWorker<StereoFrame>>(
         queue_size, *monitor_, [this](const StereoFrame& frame) { process(frame); },
-        [this] { return flow_control_->delay(ros::WallTime::now()); });
+        [this] { return flow_control_->delay(ros::SteadyTime::now()); });
     subscriber_ = std::make_unique<StereoSubscriber>(
         nh, private_nh, *monitor_, [this](const StereoFrame& frame) { worker_->push(frame); });
     publisher_ = advertise<stereo_msgs::DisparityImage>(nh, "disparity");
@@ -66,7 +66,7 @@ class DisparityNodelet : public LazyNodelet {
         done_subscriber_ = getNodeHandle().subscribe<std_msgs::Header>(
             "refinement_done", INPUT_QUEUE_SIZE,
             [this](const std_msgs::Header::ConstPtr& done) {
-              flow_control_->refined(done->stamp, ros::WallTime::now());
+              flow_control_->refined(done->stamp, ros::SteadyTime::now());
               worker_->wake();
             },
             {}, ros::TransportHints().tcpNoDelay());
@@ -76,7 +76,7 @@ class DisparityNodelet : public LazyNodelet {
   }
 
   void process(const StereoFrame& frame) {
-    const ros::WallTime begin = ros::WallTime::now();
+    const ros::SteadyTime begin = ros::SteadyTime::now();
     monitor_->traceReceived("left/image_rect", frame.left->header.stamp, frame.left->data.data());
     monitor_->traceReceived("right/image_rect", frame.right->header.stamp, frame.right->data.data());
     const auto snapshot = parameters_->snapshot();
@@ -101,7 +101,7 @@ class DisparityNodelet : public LazyNodelet {
       throw std::invalid_argument(subscriber_->leftImageTopic() + ", " + subscriber_->rightImageTopic() +
                                   ": " + e.what());
     }
-    const ros::WallTime end = ros::WallTime::now();
+    const ros::SteadyTime end = ros::SteadyTime::now();
     const double seconds = (end - begin).toSec();
     monitor_->published(message->header.stamp, seconds * 1e3);
     monitor_->tracePublished("disparity", message->header.stamp, message->image.data.data());

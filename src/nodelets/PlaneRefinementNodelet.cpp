@@ -106,8 +106,8 @@ class PlaneRefinementNodelet : public LazyNodelet {
     confidence_publisher_ = advertise<Image>(nh, "confidence");
     done_publisher_ = nh.advertise<std_msgs::Header>("refinement_done", PUBLISHER_QUEUE_SIZE);
     const ros::WallDuration patience(0.25);
-    patience_timer_ = private_nh.createWallTimer(
-        patience, [this, patience](const ros::WallTimerEvent&) { image_join_->expire(patience); });
+    patience_timer_ = private_nh.createSteadyTimer(
+        patience, [this, patience](const ros::SteadyTimerEvent&) { image_join_->expire(patience); });
     monitor_->start();
     partner_watch_->start();
     start();
@@ -192,7 +192,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
   }
 
   void process(const Frame& frame) {
-    const ros::WallTime begin = ros::WallTime::now();
+    const ros::SteadyTime begin = ros::SteadyTime::now();
     const auto snapshot = parameters_->snapshot();
     const RefinementParameters* parameters = &snapshot->parameters;
     RefinementParameters without_image;
@@ -232,7 +232,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
     } catch (const std::invalid_argument& e) {
       throw std::invalid_argument(disparity_topic + ", " + labels_topic + ": " + e.what());
     }
-    monitor_->published(stamp, (ros::WallTime::now() - begin).toSec() * 1e3);
+    monitor_->published(stamp, (ros::SteadyTime::now() - begin).toSec() * 1e3);
     monitor_->tracePublished("disparity_refined", stamp, message->image.data.data());
     refined_publisher_.publish(message);
     if (planes_publisher_.getNumSubscribers() > 0) {
@@ -371,7 +371,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
   ros::Subscriber disparity_subscriber_, labels_subscriber_, disparity_parameters_subscriber_,
       segmentation_parameters_subscriber_;
   ImageSubscriber image_subscriber_;
-  ros::WallTimer patience_timer_;
+  ros::SteadyTimer patience_timer_;
   std::unique_ptr<PartnerWatch> partner_watch_;
   std::unique_ptr<FrameWorker<Frame>> worker_;
 };

@@ -64,8 +64,8 @@ class SegmentationNodelet : public LazyNodelet {
           monitor_->received(frames);
           monitor_->dropped(DropReason::NO_PARTNER, frames);
         });
-    patience_timer_ = private_nh.createWallTimer(ros::WallDuration(0.25),
-                                                 [this](const ros::WallTimerEvent&) { gate_->expire(); });
+    patience_timer_ = private_nh.createSteadyTimer(ros::WallDuration(0.25),
+                                                   [this](const ros::SteadyTimerEvent&) { gate_->expire(); });
     publisher_ = advertise<sensor_msgs::Image>(nh, "labels");
     parameters_publisher_ = nh.advertise<FrameParameters>("segmentation_parameters", PUBLISHER_QUEUE_SIZE);
     monitor_->start();
@@ -92,7 +92,7 @@ class SegmentationNodelet : public LazyNodelet {
   }
 
   void process(const sensor_msgs::ImageConstPtr& image) {
-    const ros::WallTime begin = ros::WallTime::now();
+    const ros::SteadyTime begin = ros::SteadyTime::now();
     const auto snapshot = parameters_->snapshot();
     const SegmentationParameters& parameters = snapshot->parameters;
     monitor_->traceReceived("left/image_rect", image->header.stamp, image->data.data());
@@ -104,7 +104,7 @@ class SegmentationNodelet : public LazyNodelet {
     segments_ = segmentation_->compute(gray->image, parameters, labels);
     ROS_DEBUG_STREAM("[" << getName() << "] " << segments_ << " segments (lambda " << parameters.lambda
                          << " px, h " << parameters.h << ")");
-    monitor_->published(message->header.stamp, (ros::WallTime::now() - begin).toSec() * 1e3);
+    monitor_->published(message->header.stamp, (ros::SteadyTime::now() - begin).toSec() * 1e3);
     monitor_->tracePublished("labels", message->header.stamp, message->data.data());
     // First, so that it is there when the labels are.
     publishParameters(parameters_publisher_, message->header, snapshot->message);
@@ -121,7 +121,7 @@ class SegmentationNodelet : public LazyNodelet {
   std::unique_ptr<FrameGate<sensor_msgs::Image>> gate_;
   ImageSubscriber subscriber_;
   ros::Subscriber announcement_subscriber_;
-  ros::WallTimer patience_timer_;
+  ros::SteadyTimer patience_timer_;
   std::unique_ptr<FrameWorker<sensor_msgs::ImageConstPtr>> worker_;
 };
 

@@ -214,7 +214,7 @@ class VisualizationNodelet : public LazyNodelet {
 
   void drawMarkers(const Image& message, const Disparity& refined, const Planes& planes,
                    const CameraInfo::ConstPtr& info) {
-    const ros::WallTime begin = ros::WallTime::now();
+    const ros::SteadyTime begin = ros::SteadyTime::now();
     const std::string info_topic = getNodeHandle().resolveName("left/camera_info");
     if (!info) {
       // When a listener has just come, the first frame may be under way without.
@@ -238,7 +238,7 @@ class VisualizationNodelet : public LazyNodelet {
       patches = findPlanePatches(labels, segments, geometry, {p[2], p[6]});
     });
     const auto markers = planeMarkers(message.header, patches);
-    monitor_->published(message.header.stamp, (ros::WallTime::now() - begin).toSec() * 1e3);
+    monitor_->published(message.header.stamp, (ros::SteadyTime::now() - begin).toSec() * 1e3);
     markers_publisher_.publish(markers);
   }
 
@@ -264,11 +264,11 @@ class VisualizationNodelet : public LazyNodelet {
   template <class Draw>
   void publish(const std_msgs::Header& header, const cv::Size& size,
                const image_transport::Publisher& publisher, const Draw& draw) {
-    const ros::WallTime begin = ros::WallTime::now();
+    const ros::SteadyTime begin = ros::SteadyTime::now();
     const auto message = makeImage(header, size, sensor_msgs::image_encodings::BGR8);
     cv::Mat picture = imageView(*message, sensor_msgs::image_encodings::BGR8, publisher.getTopic());
     draw(picture);
-    monitor_->published(header.stamp, (ros::WallTime::now() - begin).toSec() * 1e3);
+    monitor_->published(header.stamp, (ros::SteadyTime::now() - begin).toSec() * 1e3);
     publisher.publish(message);
   }
 

@@ -11,8 +11,8 @@ PartnerWatch::PartnerWatch(const ros::NodeHandle& private_nh, StageMonitor& moni
       first_topic_(first_topic),
       second_topic_(second_topic),
       period_(std::max(0.1, private_nh.param("sync_warning_period", 5.0))),
-      timer_(private_nh.createWallTimer(
-          ros::WallDuration(period_), [this](const ros::WallTimerEvent&) { check(); }, false, false)) {}
+      timer_(private_nh.createSteadyTimer(
+          ros::WallDuration(period_), [this](const ros::SteadyTimerEvent&) { check(); }, false, false)) {}
 
 void PartnerWatch::check() {
   if (joined_ == 0 && first_ + second_ > 0) {

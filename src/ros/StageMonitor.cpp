@@ -38,8 +38,9 @@ StageMonitor::StageMonitor(const std::string& name, const ros::NodeHandle& nh,
   updater_.setHardwareID("none");
   updater_.add("frames", [this](DiagnosticStatusWrapper& status) { report(status); });
   // Wall time: the updater's own period stands still when the simulated time jumps back.
-  timer_ = private_nh.createWallTimer(
-      ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { updater_.force_update(); }, false, false);
+  timer_ = private_nh.createSteadyTimer(
+      ros::WallDuration(1.0), [this](const ros::SteadyTimerEvent&) { updater_.force_update(); }, false,
+      false);
 }
 
 void StageMonitor::start() { timer_.start(); }
@@ -78,7 +79,7 @@ void StageMonitor::Figure::add(double value) {
 }
 
 bool StageMonitor::isDue(const std::string& text) {
-  const ros::WallTime now = ros::WallTime::now();
+  const ros::SteadyTime now = ros::SteadyTime::now();
   const auto found = last_logged_.find(text);
   if (found != last_logged_.end() && now - found->second < REPEAT_PERIOD) return false;
   if (last_logged_.size() >= REMEMBERED_TEXTS) last_logged_.clear();
@@ -130,7 +131,7 @@ void StageMonitor::summarize(double seconds, DiagnosticStatusWrapper& status) co
 void StageMonitor::report(DiagnosticStatusWrapper& status) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    const ros::WallTime now = ros::WallTime::now();
+    const ros::SteadyTime now = ros::SteadyTime::now();
     const double seconds = std::max(1e-3, (now - last_report_).toSec());
     const auto frames = static_cast<double>(total_.published - reported_.published);
     summarize(seconds, status);

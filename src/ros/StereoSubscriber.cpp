@@ -38,8 +38,8 @@ StereoSubscriber::StereoSubscriber(const ros::NodeHandle& nh, const ros::NodeHan
   for (std::size_t i = 0; i < NAMES.size(); ++i) inputs_[i].topic = nh_.resolveName(NAMES[i]);
 
   monitor_.addDiagnostics([this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnose(status); });
-  timer_ = nh_.createWallTimer(
-      ros::WallDuration(warning_period_), [this](const ros::WallTimerEvent&) { checkForPairs(); }, false,
+  timer_ = nh_.createSteadyTimer(
+      ros::WallDuration(warning_period_), [this](const ros::SteadyTimerEvent&) { checkForPairs(); }, false,
       false);
 }
 

@@ -30,7 +30,7 @@ class Flow : public testing::Test {
   }
 
   std::unique_ptr<FlowControl> flow_;
-  ros::WallTime now_{1e9};
+  ros::SteadyTime now_{1e5};
 };
 
 TEST_F(Flow, keepsNothingWhileNobodyRefines) {

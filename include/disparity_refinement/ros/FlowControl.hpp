@@ -24,7 +24,7 @@ class FlowControl {
   FlowControl(std::size_t max_frames, int processors) : max_frames_(max_frames), processors_(processors) {}
 
   /// A frame has been matched, which took some time [s].
-  void matched(const ros::Time& stamp, double seconds, const ros::WallTime& now) {
+  void matched(const ros::Time& stamp, double seconds, const ros::SteadyTime& now) {
     const std::lock_guard<std::mutex> lock(mutex_);
     matching_time_ = seconds;
     under_way_.emplace_back(stamp, now);
@@ -32,7 +32,7 @@ class FlowControl {
   }
 
   /// This frame, and what was matched before it, has been refined or refused.
-  void refined(const ros::Time& stamp, const ros::WallTime& now) {
+  void refined(const ros::Time& stamp, const ros::SteadyTime& now) {
     const std::lock_guard<std::mutex> lock(mutex_);
     is_answered_ = true;
     const auto found = std::find_if(under_way_.begin(), under_way_.end(),
@@ -43,7 +43,7 @@ class FlowControl {
   }
 
   /// How long to wait before the next frame is begun [s], unless one is refined first; 0: no longer.
-  double delay(const ros::WallTime& now) {
+  double delay(const ros::SteadyTime& now) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!is_answered_ || under_way_.size() < maxFrames()) return 0.0;
     const double rest = PATIENCE * refinement_time_ - (now - under_way_.front().second).toSec();
@@ -68,7 +68,7 @@ class FlowControl {
   bool is_answered_ = false;
   double matching_time_ = 0.0;
   double refinement_time_ = 0.5;  // From matched() to refined(), with what waits between [s].
-  std::deque<std::pair<ros::Time, ros::WallTime>> under_way_;
+  std::deque<std::pair<ros::Time, ros::SteadyTime>> under_way_;
 };
 
 }  // namespace disparity_refinement

@@ -51,7 +51,7 @@ class FrameGate {
   /// any more.
   void announce(const ros::Time& stamp) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    last_announcement_ = ros::WallTime::now();
+    last_announcement_ = ros::SteadyTime::now();
     const auto found = std::find_if(waiting_.rbegin(), waiting_.rend(), [&stamp](const MessagePtr& frame) {
       return frame->header.stamp == stamp;
     });
@@ -76,7 +76,7 @@ class FrameGate {
 
  private:
   bool isClosed() const {
-    return last_announcement_ && ros::WallTime::now() - *last_announcement_ < patience_;
+    return last_announcement_ && ros::SteadyTime::now() - *last_announcement_ < patience_;
   }
 
   void passUnannounced(const MessagePtr& frame) {
@@ -102,7 +102,7 @@ class FrameGate {
   const Emit emit_;
   const Drop drop_;
   std::mutex mutex_;
-  std::optional<ros::WallTime> last_announcement_;
+  std::optional<ros::SteadyTime> last_announcement_;
   std::deque<MessagePtr> waiting_;
   std::deque<ros::Time> announced_;  ///< Frames that have not come yet.
   std::deque<ros::Time> passed_;     ///< Frames that did not wait for their announcement.

@@ -31,7 +31,7 @@ class OptionalJoin {
   void addFrame(const ros::Time& stamp, const Frame& frame) {
     const std::lock_guard<std::mutex> lock(mutex_);
     release(nullptr);
-    waiting_ = Waiting{stamp, ros::WallTime::now(), frame};
+    waiting_ = Waiting{stamp, ros::SteadyTime::now(), frame};
     const auto found =
         std::find_if(messages_.rbegin(), messages_.rend(),
                      [&stamp](const MessagePtr& message) { return message->header.stamp == stamp; });
@@ -54,7 +54,7 @@ class OptionalJoin {
   /// Ends a wait that is longer than `patience`. To be called now and then.
   void expire(const ros::WallDuration& patience) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (waiting_ && ros::WallTime::now() - waiting_->since > patience) release(nullptr);
+    if (waiting_ && ros::SteadyTime::now() - waiting_->since > patience) release(nullptr);
   }
 
   /// Ends the wait and forgets the messages: none will come any more.
@@ -67,7 +67,7 @@ class OptionalJoin {
  private:
   struct Waiting {
     ros::Time stamp;
-    ros::WallTime since;
+    ros::SteadyTime since;
     Frame frame;
   };
 

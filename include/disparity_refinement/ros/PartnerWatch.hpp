@@ -30,7 +30,7 @@ class PartnerWatch {
   const std::string first_topic_, second_topic_;
   const double period_;                       ///< [s]
   long first_ = 0, second_ = 0, joined_ = 0;  ///< Since the last check.
-  ros::WallTimer timer_;
+  ros::SteadyTimer timer_;
 };
 
 }  // namespace disparity_refinement

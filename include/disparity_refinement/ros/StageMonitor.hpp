@@ -92,10 +92,10 @@ class StageMonitor {
   bool is_active_ = true;
   Counts total_, reported_;
   Figure milliseconds_, age_;
-  ros::WallTime last_report_ = ros::WallTime::now();
+  ros::SteadyTime last_report_ = ros::SteadyTime::now();
   std::string last_error_;
-  std::map<std::string, ros::WallTime> last_logged_;
-  ros::WallTimer timer_;  // last: it uses the others
+  std::map<std::string, ros::SteadyTime> last_logged_;
+  ros::SteadyTimer timer_;  // last: it uses the others
 };
 
 }  // namespace disparity_refinement

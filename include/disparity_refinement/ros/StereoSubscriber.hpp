@@ -91,7 +91,7 @@ class StereoSubscriber {
   bool subscribed_ = false;
   ImageSubscriber left_, right_;
   ros::Subscriber left_info_, right_info_;
-  ros::WallTimer timer_;
+  ros::SteadyTimer timer_;
 };
 
 }  // namespace disparity_refinement
