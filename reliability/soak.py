@@ -72,7 +72,8 @@ def plane_refinement():
 # What takes most memory: buffers are kept between frames.
 LARGEST = {
     "disparity": {"sgbm_mode": 1, "min_disparity": 0, "disparity_range": 160, "full_width": True},
-    "segmentation": {"lambda": 0, "h": 0},
+    "segmentation": {"lambda": 0, "h": 0, "connectivity": 4, "structuring_element": 0,
+                     "shadow_enhancement": True, "shadow_threshold": 50, "shadow_gamma": 0.05},
     "plane_refinement": {"refinement_mode": 1, "further_segmentations": 2},
 }
 
