@@ -16,7 +16,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
-NODELETS = ("disparity", "segmentation", "plane_refinement", "visualization")
+NODELETS = ("disparity", "segmentation", "plane_refinement", "depth", "visualization")
 TOOLS = ("bag_arguments", "check_bag", "evaluate", "influence_surface", "kitti_to_bag", "refine", "render_street")
 # For a slow machine that does something else, too [s].
 TIMEOUT = 600
@@ -120,10 +120,11 @@ for module in (disparity_refinement.msg, disparity_refinement.cfg):
 '""" % self.prefix)
 
     def test_launch_files(self):
+        self.run_command("rosrun disparity_refinement render_street any.bag --frames 1")
         for name in ("stereo_refinement", "kitti"):
             path = self.prefix / ("share/disparity_refinement/launch/%s.launch" % name)
             self.assertTrue(path.is_file(), path)
-            self.run_command("rosrun roslaunch roslaunch-check %s bag:=any.bag" % path)
+            self.run_command("rosrun roslaunch roslaunch-check %s bag:=%s/any.bag" % (path, self.folder))
 
     def test_tools(self):
         for tool in TOOLS:

@@ -14,6 +14,7 @@
 #include "disparity_refinement/ros/LazyNodelet.hpp"
 #include "disparity_refinement/ros/Messages.hpp"
 #include "disparity_refinement/ros/StageMonitor.hpp"
+#include "disparity_refinement/ros/StartParameters.hpp"
 
 namespace disparity_refinement {
 
@@ -38,7 +39,8 @@ class DepthNodelet : public LazyNodelet {
     ros::NodeHandle& nh = getNodeHandle();
     ros::NodeHandle& private_nh = getPrivateNodeHandle();
     monitor_ = std::make_unique<StageMonitor>(getName(), nh, private_nh);
-    const auto queue_size = static_cast<std::size_t>(std::max(1, private_nh.param("queue_size", 1)));
+    const auto queue_size =
+        static_cast<std::size_t>(startParameter(private_nh, "queue_size", 1, 1, MAX_QUEUE_SIZE));
     worker_ = std::make_unique<FrameWorker<Disparity::ConstPtr>>(
         queue_size, *monitor_, [this](const Disparity::ConstPtr& disparity) { process(*disparity); });
     depth_publisher_ = advertise<sensor_msgs::Image>(nh, "depth/image_rect");
@@ -74,6 +76,7 @@ class DepthNodelet : public LazyNodelet {
     const ros::SteadyTime begin = ros::SteadyTime::now();
     const std::string topic = getNodeHandle().resolveName("disparity_refined");
     monitor_->traceReceived("disparity_refined", in.header.stamp, in.image.data.data());
+    requireTime(in.header, topic);
     const cv::Mat disparity = imageView(in.image, sensor_msgs::image_encodings::TYPE_32FC1, topic);
     const auto depth =
         depthImage(in.header, disparity, disparityRange(in, topic), disparityGeometry(in, topic));

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <boost/make_shared.hpp>
 #include <cmath>
 #include <memory>
 #include <mutex>
@@ -30,6 +31,7 @@
 #include "disparity_refinement/ros/StageMonitor.hpp"
 #include "disparity_refinement/ros/StampCache.hpp"
 #include "disparity_refinement/ros/StampJoin.hpp"
+#include "disparity_refinement/ros/StartParameters.hpp"
 
 namespace disparity_refinement {
 
@@ -65,13 +67,15 @@ class PlaneRefinementNodelet : public LazyNodelet {
     ros::NodeHandle& private_nh = getPrivateNodeHandle();
     monitor_ = std::make_unique<StageMonitor>(getName(), nh, private_nh);
     parameters_ = std::make_unique<LiveParameters<PlaneRefinementConfig>>(private_nh, [this] { update(); });
-    queue_size_ = std::max(1, private_nh.param("queue_size", 1));
-    min_density_ = private_nh.param("diagnostics_min_density", 0.0);
-    const auto cache_size = static_cast<std::size_t>(std::max(1, private_nh.param("cache_size", 30)));
+    queue_size_ = startParameter(private_nh, "queue_size", 1, 1, MAX_QUEUE_SIZE);
+    min_density_ = startParameter(private_nh, "diagnostics_min_density", 0.0, 0.0, 1.0);
+    const auto cache_size =
+        static_cast<std::size_t>(startParameter(private_nh, "cache_size", 30, 1, MAX_QUEUE_SIZE));
     worker_ = std::make_unique<FrameWorker<Frame>>(queue_size_, *monitor_, [this](const Frame& frame) {
       // In whatever way it ends.
-      const std::shared_ptr<void> announcement(
-          nullptr, [&](void* /*unused*/) { done_publisher_.publish(frame.disparity->header); });
+      const std::shared_ptr<void> announcement(nullptr, [&](void* /*unused*/) {
+        done_publisher_.publish(boost::make_shared<std_msgs::Header>(frame.disparity->header));
+      });
       process(frame);
     });
     image_join_ = std::make_unique<OptionalJoin<Frame, Image>>(
@@ -107,7 +111,8 @@ class PlaneRefinementNodelet : public LazyNodelet {
     done_publisher_ = nh.advertise<std_msgs::Header>("refinement_done", PUBLISHER_QUEUE_SIZE);
     const ros::WallDuration patience(0.25);
     patience_timer_ = private_nh.createSteadyTimer(
-        patience, [this, patience](const ros::SteadyTimerEvent&) { image_join_->expire(patience); });
+        ros::WallDuration(0.025),
+        [this, patience](const ros::SteadyTimerEvent&) { image_join_->expire(patience); });
     monitor_->start();
     partner_watch_->start();
     start();

@@ -14,6 +14,7 @@
 #include "disparity_refinement/ros/LiveParameters.hpp"
 #include "disparity_refinement/ros/Messages.hpp"
 #include "disparity_refinement/ros/StageMonitor.hpp"
+#include "disparity_refinement/ros/StartParameters.hpp"
 #include "disparity_refinement/segmentation/Segmentation.hpp"
 
 namespace disparity_refinement {
@@ -45,17 +46,13 @@ class SegmentationNodelet : public LazyNodelet {
       status.add("h [gray levels]", parameters.h);
     });
     parameters_ = std::make_unique<LiveParameters<SegmentationConfig>>(private_nh);
-    queue_size_ = std::max(1, private_nh.param("queue_size", 5));
-    const int asked = private_nh.param("segmentation_threads", 1);
-    const int threads = std::clamp(asked, 1, FilteredWatershed::MAX_STRIPS);
-    if (threads != asked) {
-      NODELET_WARN_STREAM(private_nh.resolveName("segmentation_threads")
-                          << " is " << asked << ", which is out of range: using " << threads);
-    }
+    queue_size_ = startParameter(private_nh, "queue_size", 5, 1, MAX_QUEUE_SIZE);
+    const int threads =
+        startParameter(private_nh, "segmentation_threads", 1, 1, FilteredWatershed::MAX_STRIPS);
     segmentation_ = std::make_unique<Segmentation>(threads);
     worker_ = std::make_unique<FrameWorker<sensor_msgs::ImageConstPtr>>(
         queue_size_, *monitor_, [this](const sensor_msgs::ImageConstPtr& image) { process(image); });
-    is_following_ = private_nh.param("follow_disparity", true);
+    is_following_ = startParameter(private_nh, "follow_disparity", true);
     // More than a second without a disparity map: there is no matcher, or one that does not care.
     gate_ = std::make_unique<FrameGate<sensor_msgs::Image>>(
         static_cast<std::size_t>(queue_size_ + 2), ros::WallDuration(1.0),

@@ -24,6 +24,7 @@
 #include "disparity_refinement/ros/PlaneMarkers.hpp"
 #include "disparity_refinement/ros/StageMonitor.hpp"
 #include "disparity_refinement/ros/StampJoin.hpp"
+#include "disparity_refinement/ros/StartParameters.hpp"
 #include "disparity_refinement/ros/StereoGeometry.hpp"
 #include "disparity_refinement/visualization/Colorize.hpp"
 #include "disparity_refinement/visualization/PlanePatches.hpp"
@@ -67,7 +68,8 @@ class VisualizationNodelet : public LazyNodelet {
     constexpr std::size_t PICTURES = 6;
     worker_ =
         std::make_unique<FrameWorker<Picture>>(PICTURES, *monitor_, [](const Picture& draw) { draw(); });
-    const auto cache_size = static_cast<std::size_t>(std::max(1, private_nh.param("cache_size", 30)));
+    const auto cache_size =
+        static_cast<std::size_t>(startParameter(private_nh, "cache_size", 30, 1, MAX_QUEUE_SIZE));
     const auto ignore = [](const auto&) {};
     borders_join_ = std::make_unique<StampJoin<Image, Image>>(
         cache_size,

@@ -3,6 +3,7 @@
 #include <exception>
 
 #include "disparity_refinement/ros/ImageSubscriber.hpp"
+#include "disparity_refinement/ros/StartParameters.hpp"
 
 namespace disparity_refinement {
 
@@ -17,7 +18,7 @@ image_transport::Publisher LazyNodelet::advertiseImage(image_transport::ImageTra
 void LazyNodelet::start() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    lazy_ = getPrivateNodeHandle().param("lazy", true);
+    lazy_ = startParameter(getPrivateNodeHandle(), "lazy", true);
     started_ = true;
   }
   update();

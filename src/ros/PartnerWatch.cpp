@@ -1,7 +1,8 @@
 #include "disparity_refinement/ros/PartnerWatch.hpp"
 
-#include <algorithm>
 #include <sstream>
+
+#include "disparity_refinement/ros/StartParameters.hpp"
 
 namespace disparity_refinement {
 
@@ -10,7 +11,7 @@ PartnerWatch::PartnerWatch(const ros::NodeHandle& private_nh, StageMonitor& moni
     : monitor_(monitor),
       first_topic_(first_topic),
       second_topic_(second_topic),
-      period_(std::max(0.1, private_nh.param("sync_warning_period", 5.0))),
+      period_(startParameter(private_nh, "sync_warning_period", 5.0, 0.1, 3600.0)),
       timer_(private_nh.createSteadyTimer(
           ros::WallDuration(period_), [this](const ros::SteadyTimerEvent&) { check(); }, false, false)) {}
 
@@ -20,7 +21,8 @@ void PartnerWatch::check() {
     text << "no two messages with the same stamp for " << period_ << " s; messages: " << first_topic_ << " "
          << first_ << ", " << second_topic_ << " " << second_ << "; ";
     if (first_ == 0 || second_ == 0) {
-      text << "a topic without messages: does its publisher run? check the names and remaps";
+      text << "a topic without messages: does its publisher run? check the names and remaps, and what its "
+              "publisher warns of";
     } else {
       text << "both need the stamp of the left image that they are made of";
     }

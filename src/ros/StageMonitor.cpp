@@ -5,6 +5,8 @@
 #include <numeric>
 #include <sstream>
 
+#include "disparity_refinement/ros/StartParameters.hpp"
+
 namespace disparity_refinement {
 namespace {
 
@@ -31,13 +33,13 @@ std::string join(const Parts&... parts) {
 StageMonitor::StageMonitor(const std::string& name, const ros::NodeHandle& nh,
                            const ros::NodeHandle& private_nh)
     : name_(name),
-      min_rate_(private_nh.param("diagnostics_min_rate", 0.0)),
-      max_dropped_(private_nh.param("diagnostics_max_dropped", 0.0)),
-      max_age_(private_nh.param("diagnostics_max_age", 0.0)),
+      min_rate_(startParameter(private_nh, "diagnostics_min_rate", 0.0, 0.0, 1e6)),
+      max_dropped_(startParameter(private_nh, "diagnostics_max_dropped", 0.0, 0.0, 1.0)),
+      max_age_(startParameter(private_nh, "diagnostics_max_age", 0.0, 0.0, 1e6)),
       updater_(nh, private_nh, name) {
   updater_.setHardwareID("none");
   updater_.add("frames", [this](DiagnosticStatusWrapper& status) { report(status); });
-  // Wall time: the updater's own period stands still when the simulated time jumps back.
+  // Steady time: the updater's own period stands still when the simulated time jumps back.
   timer_ = private_nh.createSteadyTimer(
       ros::WallDuration(1.0), [this](const ros::SteadyTimerEvent&) { updater_.force_update(); }, false,
       false);

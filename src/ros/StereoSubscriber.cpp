@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "disparity_refinement/ros/Messages.hpp"
+#include "disparity_refinement/ros/StartParameters.hpp"
 
 namespace disparity_refinement {
 namespace {
@@ -27,11 +28,10 @@ StereoSubscriber::StereoSubscriber(const ros::NodeHandle& nh, const ros::NodeHan
       private_nh_(private_nh),
       monitor_(monitor),
       callback_(std::move(callback)),
-      approximate_(private_nh.param("approximate_sync", false)),
-      max_interval_(
-          std::min(3600.0, std::max(1e-6, private_nh.param("approximate_sync_max_interval", 0.01)))),
-      queue_size_(std::max(MIN_QUEUE_SIZE, private_nh.param("queue_size", 1))),
-      warning_period_(std::max(0.1, private_nh.param("sync_warning_period", 5.0))),
+      approximate_(startParameter(private_nh, "approximate_sync", false)),
+      max_interval_(startParameter(private_nh, "approximate_sync_max_interval", 0.01, 1e-6, 3600.0)),
+      queue_size_(std::clamp(private_nh.param("queue_size", 1), MIN_QUEUE_SIZE, MAX_QUEUE_SIZE)),
+      warning_period_(startParameter(private_nh, "sync_warning_period", 5.0, 0.1, 3600.0)),
       join_(
           static_cast<std::size_t>(queue_size_), approximate_ ? max_interval_ : 0.0,
           [this](const StereoFrame& frame) { pair(frame); }, [this](int images) { unpaired_ += images; }) {
@@ -139,7 +139,9 @@ void StereoSubscriber::checkForPairs() {
     std::ostringstream text;
     text << "no synchronized stereo pair for " << warning_period_ << " s; messages:";
     for (const Input& input : inputs_) {
-      text << " " << input.topic << " " << input.received << (&input == &inputs_.back() ? "" : ",");
+      text << " " << input.topic << " " << input.received;
+      if (!input.last.isZero()) text << " (last stamp " << input.last << ")";
+      if (&input != &inputs_.back()) text << ",";
     }
     problem_ = text.str() + advice();
     monitor_.warning(problem_);

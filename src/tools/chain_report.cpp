@@ -95,6 +95,12 @@ class ChainReport {
     std::string text;
     text += format("%-20s %8d\n", "frames in", frames_in_);
     text += format("%-20s %8d\n", "frames refined", static_cast<int>(latencies_.size()));
+    if (static_cast<int>(latencies_.size()) < frames_in_) {
+      text +=
+          "Some frames were not refined: the bag is played faster than this machine can follow (lower "
+          "rate:=), "
+          "or the log says why.\n";
+    }
     if (latencies_.size() > 1) {
       std::vector<double> sorted = latencies_;
       std::sort(sorted.begin(), sorted.end());

@@ -90,12 +90,29 @@ TEST_F(Flow, doesNotWaitForeverForALostFrame) {
   EXPECT_GT(delay(), 0.0);
 }
 
-TEST_F(Flow, knowsFramesThatItHasNotMatched) {
+TEST_F(Flow, doesNotCareForFramesOfSomebodyElse) {
   start(1);
   refine(7);
-  EXPECT_EQ(delay(), 0.0);
   match(1);
-  EXPECT_GT(delay(), 0.0) << "somebody refines";
+  EXPECT_EQ(delay(), 0.0);
+  refine(8);
+  EXPECT_EQ(delay(), 0.0);
+}
+
+TEST_F(Flow, learnsThatTheRefinementIsSlowerNow) {
+  start(1);
+  refineInTurn(1, 0.021);
+  // Nobody would answer as late as this.
+  for (int i = 1; i < 6; ++i) {
+    match(i);
+    pass(0.1);
+    EXPECT_EQ(delay(), 0.0) << i;
+  }
+  pass(0.1);
+  refine(1);
+  EXPECT_GT(delay(), 0.5) << "the others are under way";
+  refine(5);
+  EXPECT_EQ(delay(), 0.0);
 }
 
 TEST_F(Flow, overlapsTheStagesWhereThereAreProcessorsForBoth) {

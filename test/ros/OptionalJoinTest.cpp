@@ -2,8 +2,10 @@
 #include <sensor_msgs/Image.h>
 
 #include <boost/make_shared.hpp>
+#include <chrono>
 #include <cstdint>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "disparity_refinement/ros/OptionalJoin.hpp"
@@ -85,6 +87,27 @@ TEST_F(OptionalJoinTest, letsNoFrameWaitForLongerThanThePatience) {
   EXPECT_EQ(emitted_, (Texts{"1"}));
   join_.expire(ros::WallDuration(-1.0));
   EXPECT_EQ(emitted_, (Texts{"1"}));
+}
+
+TEST_F(OptionalJoinTest, doesNotWaitForAMessageThatALaterOneHasOvertaken) {
+  addFrame(1, "1");
+  addMessage(2, "b");
+  EXPECT_EQ(emitted_, (Texts{"1"}));
+}
+
+TEST_F(OptionalJoinTest, hasLessPatienceWhileTheStreamHasFailed) {
+  const ros::WallDuration PATIENCE(0.1);
+  addFrame(1, "1");
+  join_.expire(ros::WallDuration(-1.0));
+  addFrame(2, "2");
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  join_.expire(PATIENCE);
+  EXPECT_EQ(emitted_, (Texts{"1", "2"}));
+  addMessage(3, "c");
+  addFrame(4, "4");
+  join_.expire(ros::WallDuration(3600.0));
+  addMessage(4, "d");
+  EXPECT_EQ(emitted_, (Texts{"1", "2", "4 d"}));
 }
 
 TEST_F(OptionalJoinTest, losesNoFrameWhenItIsFlushed) {

@@ -28,17 +28,18 @@ class FlowControl {
     const std::lock_guard<std::mutex> lock(mutex_);
     matching_time_ = seconds;
     under_way_.emplace_back(stamp, now);
-    if (under_way_.size() > maxFrames()) under_way_.pop_front();
+    if (under_way_.size() > std::max(REMEMBERED, max_frames_)) under_way_.pop_front();
   }
 
-  /// This frame, and what was matched before it, has been refined or refused.
+  /// This frame, and what was matched before it, has been refined or refused. Frames of somebody else are
+  /// ignored.
   void refined(const ros::Time& stamp, const ros::SteadyTime& now) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    is_answered_ = true;
     const auto found = std::find_if(under_way_.begin(), under_way_.end(),
                                     [&stamp](const auto& frame) { return frame.first == stamp; });
     if (found == under_way_.end()) return;
-    refinement_time_ = std::max(MIN_TIME, (now - found->second).toSec());
+    is_answered_ = true;
+    refinement_time_ = (now - found->second).toSec();
     under_way_.erase(under_way_.begin(), found + 1);
   }
 
@@ -46,15 +47,17 @@ class FlowControl {
   double delay(const ros::SteadyTime& now) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!is_answered_ || under_way_.size() < maxFrames()) return 0.0;
-    const double rest = PATIENCE * refinement_time_ - (now - under_way_.front().second).toSec();
+    const double rest =
+        PATIENCE * std::max(MIN_TIME, refinement_time_) - (now - under_way_.back().second).toSec();
     // The frame was lost on its way, or nobody refines any more.
     if (rest <= 0.0) is_answered_ = false;
     return std::max(0.0, rest);
   }
 
  private:
-  static constexpr double PATIENCE = 3.0;   // Refinements like the one before.
-  static constexpr double MIN_TIME = 0.02;  // [s]
+  static constexpr std::size_t REMEMBERED = 100;  // Frames.
+  static constexpr double PATIENCE = 2.0;         // Refinements like the one before.
+  static constexpr double MIN_TIME = 0.02;        // [s]
   static constexpr double SHORT = 0.25;  // Share of the matching's time that a refinement may share with it.
 
   std::size_t maxFrames() const {

@@ -14,8 +14,8 @@
 namespace disparity_refinement {
 
 /// Gives every frame the message with its stamp of another stream, which may fail: a frame whose message is
-/// not there waits for it until the next frame comes or expire() finds it too old, and then goes on without.
-/// So no frame is lost, and they keep their order.
+/// not there waits for it until a later message or the next frame comes, or expire() finds it too old, and
+/// then goes on without. So no frame is lost, and they keep their order.
 ///
 /// Up to `capacity` messages are kept in order of arrival, which alone decides what is old: see StampJoin.
 /// Any number of threads may call.
@@ -47,14 +47,20 @@ class OptionalJoin {
       release(message);
       return;
     }
+    // Streams are in order, so the one of the waiting frame has been lost.
+    if (waiting_ && waiting_->stamp < message->header.stamp) release(nullptr);
+    is_missing_ = false;
     messages_.push_back(message);
     if (messages_.size() > capacity_) messages_.pop_front();
   }
 
-  /// Ends a wait that is longer than `patience`. To be called now and then.
+  /// Ends a wait that is longer than `patience`, or than a tenth of it if a frame has waited in vain and no
+  /// message has come since. To be called now and then.
   void expire(const ros::WallDuration& patience) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (waiting_ && ros::SteadyTime::now() - waiting_->since > patience) release(nullptr);
+    if (!waiting_ || ros::SteadyTime::now() - waiting_->since <= patience * (is_missing_ ? 0.1 : 1.0)) return;
+    release(nullptr);
+    is_missing_ = true;
   }
 
   /// Ends the wait and forgets the messages: none will come any more.
@@ -62,6 +68,7 @@ class OptionalJoin {
     const std::lock_guard<std::mutex> lock(mutex_);
     release(nullptr);
     messages_.clear();
+    is_missing_ = false;
   }
 
  private:
@@ -81,6 +88,7 @@ class OptionalJoin {
   const Emit emit_;
   std::mutex mutex_;
   std::optional<Waiting> waiting_;
+  bool is_missing_ = false;  ///< A frame has waited in vain, and no message has come since.
   std::deque<MessagePtr> messages_;
 };
 

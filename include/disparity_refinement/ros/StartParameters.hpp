@@ -1,0 +1,22 @@
+#pragma once
+
+#include <ros/node_handle.h>
+
+#include <string>
+
+namespace disparity_refinement {
+
+/// A private parameter that is read once, when a nodelet starts; `fallback` if it is not set.
+///
+/// A value out of range is replaced by the nearest allowed one, a value of another type by `fallback`; a
+/// warning says so.
+int startParameter(const ros::NodeHandle& private_nh, const std::string& name, int fallback, int least,
+                   int largest);
+double startParameter(const ros::NodeHandle& private_nh, const std::string& name, double fallback,
+                      double least, double largest);
+bool startParameter(const ros::NodeHandle& private_nh, const std::string& name, bool fallback);
+
+/// Of queue_size and cache_size [frames].
+constexpr int MAX_QUEUE_SIZE = 100000;
+
+}  // namespace disparity_refinement
