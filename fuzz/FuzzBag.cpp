@@ -65,6 +65,8 @@ void write(Input& input, rosbag::Bag& bag) {
   }
 }
 
+}  // namespace
+
 void test(Input& input) {
   static const TemporaryFolder folder;
   // To make one takes a tenth of a second, and it grows with every file that it opens.
@@ -99,12 +101,5 @@ void test(Input& input) {
   }
 }
 
-}  // namespace
 }  // namespace fuzz
 }  // namespace disparity_refinement
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  disparity_refinement::fuzz::Input input(bytes, size);
-  disparity_refinement::fuzz::test(input);
-  return 0;
-}

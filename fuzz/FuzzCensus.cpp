@@ -31,6 +31,8 @@ void requireSpeckleFilter(Input& input, const cv::Mat& map) {
   require(same(filtered, expected), "the speckle filter does what OpenCV's does");
 }
 
+}  // namespace
+
 void test(Input& input) {
   CensusSgm matcher(input.yes() ? CensusSgm::Vectors::WIDEST : CensusSgm::Vectors::BYTES_16);
   for (int i = input.number(0, 1); i >= 0; --i) {
@@ -54,12 +56,5 @@ void test(Input& input) {
   succeeds([&] { SpeckleFilter().apply(map.mat(), static_cast<short>(invalid), most, difference); });
 }
 
-}  // namespace
 }  // namespace fuzz
 }  // namespace disparity_refinement
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  disparity_refinement::fuzz::Input input(bytes, size);
-  disparity_refinement::fuzz::test(input);
-  return 0;
-}

@@ -194,12 +194,8 @@ void testOptional(Input& input) {
 }
 
 }  // namespace
-}  // namespace fuzz
-}  // namespace disparity_refinement
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  using namespace disparity_refinement::fuzz;
-  Input input(bytes, size);
+void test(Input& input) {
   switch (input.number(0, 3)) {
     case 0:
       testStamps(input);
@@ -213,5 +209,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t siz
     default:
       testStereo(input);
   }
-  return 0;
 }
+
+}  // namespace fuzz
+}  // namespace disparity_refinement

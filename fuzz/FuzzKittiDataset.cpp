@@ -86,6 +86,8 @@ std::string nameOf(Input& input) {
                                    "000003_10.png", "-1.png", "000001.PNG"});
 }
 
+}  // namespace
+
 void test(Input& input) {
   static const Folders folders;
   const int layout = input.number(0, 2);
@@ -137,12 +139,5 @@ void test(Input& input) {
   succeeds<std::runtime_error>([&] { listGroundTruth(folder.string(), left_out); }, folders.root.string());
 }
 
-}  // namespace
 }  // namespace fuzz
 }  // namespace disparity_refinement
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  disparity_refinement::fuzz::Input input(bytes, size);
-  disparity_refinement::fuzz::test(input);
-  return 0;
-}

@@ -102,12 +102,8 @@ void testCalibration(Input& input) {
 }
 
 }  // namespace
-}  // namespace fuzz
-}  // namespace disparity_refinement
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  using namespace disparity_refinement::fuzz;
-  Input input(bytes, size);
+void test(Input& input) {
   switch (input.number(0, 3)) {
     case 0:
       testCalibration(input);
@@ -118,5 +114,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t siz
     default:
       testImages(input);
   }
-  return 0;
 }
+
+}  // namespace fuzz
+}  // namespace disparity_refinement

@@ -51,6 +51,8 @@ void requireMap(const cv::Mat& map, const DisparityRange& range) {
   require(has_hole, "at least one pixel is invalid");
 }
 
+}  // namespace
+
 void test(Input& input) {
   StereoMatcher matcher;
   for (int i = input.number(0, 1); i >= 0; --i) {
@@ -77,12 +79,5 @@ void test(Input& input) {
   }
 }
 
-}  // namespace
 }  // namespace fuzz
 }  // namespace disparity_refinement
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  disparity_refinement::fuzz::Input input(bytes, size);
-  disparity_refinement::fuzz::test(input);
-  return 0;
-}

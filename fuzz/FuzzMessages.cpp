@@ -204,12 +204,8 @@ void testLabels(Input& input) {
 }
 
 }  // namespace
-}  // namespace fuzz
-}  // namespace disparity_refinement
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  using namespace disparity_refinement::fuzz;
-  Input input(bytes, size);
+void test(Input& input) {
   switch (input.number(0, 6)) {
     case 0:
     case 1:
@@ -227,5 +223,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t siz
     default:
       testDisparity(input);
   }
-  return 0;
 }
+
+}  // namespace fuzz
+}  // namespace disparity_refinement

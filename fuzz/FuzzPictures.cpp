@@ -172,12 +172,8 @@ void testPanels(Input& input) {
 }
 
 }  // namespace
-}  // namespace fuzz
-}  // namespace disparity_refinement
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  using namespace disparity_refinement::fuzz;
-  Input input(bytes, size);
+void test(Input& input) {
   switch (input.number(0, 3)) {
     case 0:
       testColours(input);
@@ -191,5 +187,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t siz
     default:
       testPanels(input);
   }
-  return 0;
 }
+
+}  // namespace fuzz
+}  // namespace disparity_refinement

@@ -198,6 +198,8 @@ void requireStatistics(const Frame& frame, const DisparityRefinement& refinement
   require(refused <= statistics.segments, "a segment is refused for one reason at most");
 }
 
+}  // namespace
+
 void test(Input& input) {
   DisparityRefinement refinement;
   const Frame frame(input);
@@ -225,12 +227,5 @@ void test(Input& input) {
   require(same(again, refined.mat()), "the same frame gives the same bits");
 }
 
-}  // namespace
 }  // namespace fuzz
 }  // namespace disparity_refinement
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  disparity_refinement::fuzz::Input input(bytes, size);
-  disparity_refinement::fuzz::test(input);
-  return 0;
-}

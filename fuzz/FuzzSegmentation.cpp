@@ -67,6 +67,8 @@ void requireSegments(const Segmentation& segmentation, const SegmentationParamet
           "the labels are 0 ... n - 1");
 }
 
+}  // namespace
+
 void test(Input& input) {
   const int strips = input.oneIn(2) ? 1 : input.parameter(1, 64);
   std::unique_ptr<Segmentation> segmentation;
@@ -95,12 +97,5 @@ void test(Input& input) {
   }
 }
 
-}  // namespace
 }  // namespace fuzz
 }  // namespace disparity_refinement
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  disparity_refinement::fuzz::Input input(bytes, size);
-  disparity_refinement::fuzz::test(input);
-  return 0;
-}

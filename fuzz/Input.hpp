@@ -285,5 +285,8 @@ class Input {
   std::uint64_t seed_ = 0;
 };
 
+/// What a harness does with an input: each defines it.
+void test(Input& input);
+
 }  // namespace fuzz
 }  // namespace disparity_refinement
