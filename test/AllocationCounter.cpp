@@ -28,7 +28,16 @@ Allocations stopCounting() {
   return {allocation_count, bytes};
 }
 
+// As gcc says it, and clang.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define HAS_SANITIZER
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define HAS_SANITIZER
+#endif
+#endif
+
+#ifdef HAS_SANITIZER
 
 bool canCountAllocations() { return false; }
 
