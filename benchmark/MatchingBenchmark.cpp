@@ -37,12 +37,13 @@ void registerMatcher(const std::string& set, const std::string& name, const Make
   registerMatcher(set, name, 1, WarmUp::NO, create);
 }
 
-MatchingParameters censusParameters() {
+MatchingParameters censusParameters(bool aggregate_rows = false) {
   MatchingParameters parameters;
   parameters.stereo_algorithm = StereoAlgorithm::CENSUS_SGM;
   parameters.disparity_range = DISPARITIES;
   parameters.full_width = true;
   parameters.uniqueness_ratio = 0;
+  parameters.aggregate_rows = aggregate_rows;
   return parameters;
 }
 
@@ -100,9 +101,12 @@ void registerMatchingBenchmarks(const std::string& set) {
   parameters.disparity_range = DISPARITIES;
   registerMatcher(set, "StereoMatcher, default (3WAY)",
                   [parameters] { return std::make_unique<StereoMatcher>(parameters); });
-  const auto census = [] { return std::make_unique<StereoMatcher>(censusParameters()); };
-  registerMatcher(set, "census SGM", 1, WarmUp::YES, census);
-  registerMatcher(set, "census SGM, 2 threads", 2, WarmUp::YES, census);
+  for (const bool aggregate_rows : {false, true}) {
+    const std::string name = aggregate_rows ? "census SGM, aggregate_rows" : "census SGM";
+    const auto census = [=] { return std::make_unique<StereoMatcher>(censusParameters(aggregate_rows)); };
+    registerMatcher(set, name, 1, WarmUp::YES, census);
+    registerMatcher(set, name + ", 2 threads", 2, WarmUp::YES, census);
+  }
   registerMatcher(set, "census SGM, 16-byte vectors", 1, WarmUp::YES,
                   [] { return std::make_unique<MatcherOf16ByteVectors>(); });
 }

@@ -12,6 +12,7 @@ BLOCK_MATCHING = "cv::StereoBM, window 15"
 SEGMENTATION = "segmentation (30,5)"
 REFINEMENT = "plane refinement (30,5)"
 MATCHING = "census SGM"
+AGGREGATED = "census SGM, aggregate_rows"
 QUALITY = "quality refinement (30,5)"
 SIZES = ["640x480", "1242x375", "1920x1200", "4096x3000"]
 TARGETS = {
@@ -27,8 +28,8 @@ BOTH_IN_BLOCK_MATCHING = 0.5
 # The stages of a whole frame one after the other.
 FRAMES = {
     "frame: census SGM, segmentation, plane refinement": ([MATCHING, SEGMENTATION, REFINEMENT], 0.4),
-    "frame: census SGM, segmentation, quality refinement": ([MATCHING, SEGMENTATION, QUALITY], 1.0),
-    "the same, 2 threads": ([f"{stage}, 2 threads" for stage in (MATCHING, SEGMENTATION, QUALITY)], 0.6),
+    "frame: census SGM, segmentation, quality refinement": ([AGGREGATED, SEGMENTATION, QUALITY], 1.0),
+    "the same, 2 threads": ([f"{stage}, 2 threads" for stage in (AGGREGATED, SEGMENTATION, QUALITY)], 0.6),
 }
 
 

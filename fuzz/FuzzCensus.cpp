@@ -20,6 +20,7 @@ CensusSgmParameters parametersOf(Input& input) {
   parameters.p1 = input.parameter(0, std::max(parameters.p2, 0));
   parameters.uniqueness_ratio = input.parameter(0, 99);
   parameters.disp12_max_diff = input.parameter(-1, 100);
+  parameters.aggregate_rows = input.yes();
   return parameters;
 }
 

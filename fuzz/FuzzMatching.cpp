@@ -34,6 +34,7 @@ MatchingParameters parametersOf(Input& input) {
   }
   parameters.disp12MaxDiff = input.oneIn(4) ? input.parameter(-1, 4096) : input.parameter(-1, 4);
   parameters.full_width = input.yes();
+  parameters.aggregate_rows = input.yes();
   return parameters;
 }
 

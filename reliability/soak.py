@@ -41,7 +41,7 @@ def disparity():
         {"uniqueness_ratio": random.randint(0, 30), "texture_threshold": random.randint(0, 30)},
         {"disp12MaxDiff": random.randint(-1, 4)},
         {"speckle_size": random.randint(0, 400), "speckle_range": random.randint(0, 8)},
-        {"full_width": random.random() < 0.5},
+        {"full_width": random.random() < 0.5, "aggregate_rows": random.random() < 0.5},
     ])
 
 

@@ -12,7 +12,7 @@ namespace disparity_refinement {
 /// of N bytes; vector r holds d = i R + r in lane i, so that d - 1 and d + 1 are the same lane of a
 /// neighbouring vector. Values beyond the last disparity are there to fill the vectors, and never win.
 struct CensusPathsInput {
-  int width, disparities;
+  int width, height, disparities;
   int min_disparity;
   int vectors;  ///< R, for the N of the functions used: least R with N R >= disparities.
 
@@ -34,6 +34,7 @@ struct CensusPathsInput {
   const std::uint16_t* place;
 
   std::uint8_t p1, p2;
+  bool aggregate_rows;  ///< Costs are averages over three rows.
   /// By the least sum of a pixel: the largest sum by which another disparity makes it ambiguous. Null: none
   /// does.
   const std::uint8_t* ambiguous;
@@ -49,17 +50,27 @@ struct CensusWinners {
   std::uint16_t* right_disparity;
 };
 
+/// What a step of a vertical path to a row needs for averages over rows; unused without aggregate_rows.
+struct CensusCostRows {
+  std::uint8_t* here;    ///< Costs of this row.
+  std::uint8_t* beside;  ///< Those of the row before; the step leaves those of the row after here.
+  int after;             ///< The row that the path goes to next.
+};
+
 /// The inner loops. All work on rows y of costs, path values and sums, of width pixels with the striped
 /// values of all disparities each.
 struct CensusPathsFunctions {
   int lanes;  ///< N
 
-  /// One step of vertical paths to row y, in the columns x_begin ... x_end - 1. `state` has the path values
-  /// of the row before less their least one, and then those of this row.
-  void (*step)(const CensusPathsInput& input, int y, int x_begin, int x_end, std::uint8_t* state);
+  /// The costs of row y, not averaged over rows, in the columns x_begin ... x_end - 1.
+  void (*findCosts)(const CensusPathsInput& input, int y, int x_begin, int x_end, std::uint8_t* costs);
+  /// One step of vertical paths to row y in these columns. `state` has the path values of the row before less
+  /// their least one, and then those of this row.
+  void (*step)(const CensusPathsInput& input, int y, int x_begin, int x_end, const CensusCostRows& rows,
+               std::uint8_t* state);
   /// The same for a whole row; keeps its costs and path values.
-  void (*stepAndKeep)(const CensusPathsInput& input, int y, std::uint8_t* state, std::uint8_t* costs,
-                      std::uint8_t* values);
+  void (*stepAndKeep)(const CensusPathsInput& input, int y, const CensusCostRows& rows, std::uint8_t* state,
+                      std::uint8_t* costs, std::uint8_t* values);
   /// Adds the path from above and that from the left to the sums of a row, and the path from the right to
   /// those of the row before. Either row may be absent (null).
   void (*addPaths)(const CensusPathsInput& input, const std::uint8_t* costs, std::uint8_t* state,

@@ -15,33 +15,30 @@ namespace {
 template <class Vector, int FIXED>
 class CensusPathsLoops {
  public:
-  static void step(const CensusPathsInput& input, int y, int x_begin, int x_end, std::uint8_t* state) {
-    Costs costs(input, y, x_begin);
-    const Step next(input);
-    const int vectors = vectorsOf(input);
+  static void findCosts(const CensusPathsInput& input, int y, int x_begin, int x_end, std::uint8_t* costs) {
+    Costs row(input, y, x_begin);
     for (int x = x_begin; x < x_end; ++x) {
-      std::uint8_t* pixel = state + x * bytesOf(input);
-      Values c, path;
-      costs.next(c);
-      path.load(pixel, vectors);
-      next.advance(path, c, [](int, Vector) {});
-      path.store(pixel, vectors);
+      Values c;
+      row.next(c);
+      c.store(costs + x * bytesOf(input), vectorsOf(input));
     }
   }
 
-  static void stepAndKeep(const CensusPathsInput& input, int y, std::uint8_t* state, std::uint8_t* kept_costs,
-                          std::uint8_t* kept_values) {
-    Costs costs(input, y, 0);
-    const Step next(input);
-    const int vectors = vectorsOf(input);
-    for (int x = 0; x < input.width; ++x) {
-      const std::ptrdiff_t offset = x * bytesOf(input);
-      Values c, path;
-      costs.next(c);
-      c.store(kept_costs + offset, vectors);
-      path.load(state + offset, vectors);
-      next.advance(path, c, [&](int r, Vector value) { value.store(kept_values + offset + r * N); });
-      path.store(state + offset, vectors);
+  static void step(const CensusPathsInput& input, int y, int x_begin, int x_end, const CensusCostRows& rows,
+                   std::uint8_t* state) {
+    if (input.aggregate_rows) {
+      step<true>(input, y, x_begin, x_end, rows, state);
+    } else {
+      step<false>(input, y, x_begin, x_end, rows, state);
+    }
+  }
+
+  static void stepAndKeep(const CensusPathsInput& input, int y, const CensusCostRows& rows,
+                          std::uint8_t* state, std::uint8_t* costs, std::uint8_t* values) {
+    if (input.aggregate_rows) {
+      stepAndKeep<true>(input, y, rows, state, costs, values);
+    } else {
+      stepAndKeep<false>(input, y, rows, state, costs, values);
     }
   }
 
@@ -88,6 +85,51 @@ class CensusPathsLoops {
       for (int r = 0; r < vectors; ++r) of[r] = Vector::all(value);
     }
   };
+
+  template <bool OF_ROWS>
+  static void step(const CensusPathsInput& input, int y, int x_begin, int x_end, const CensusCostRows& rows,
+                   std::uint8_t* state) {
+    Costs costs(input, OF_ROWS ? rows.after : y, x_begin);
+    const Step next(input);
+    const int vectors = vectorsOf(input);
+    for (int x = x_begin; x < x_end; ++x) {
+      const std::ptrdiff_t offset = x * bytesOf(input);
+      Values c, path;
+      costs.next(c);
+      if (OF_ROWS) averageRows(rows, offset, vectors, c);
+      path.load(state + offset, vectors);
+      next.advance(path, c, [](int, Vector) {});
+      path.store(state + offset, vectors);
+    }
+  }
+
+  template <bool OF_ROWS>
+  static void stepAndKeep(const CensusPathsInput& input, int y, const CensusCostRows& rows,
+                          std::uint8_t* state, std::uint8_t* kept_costs, std::uint8_t* kept_values) {
+    Costs costs(input, OF_ROWS ? rows.after : y, 0);
+    const Step next(input);
+    const int vectors = vectorsOf(input);
+    for (int x = 0; x < input.width; ++x) {
+      const std::ptrdiff_t offset = x * bytesOf(input);
+      Values c, path;
+      costs.next(c);
+      if (OF_ROWS) averageRows(rows, offset, vectors, c);
+      c.store(kept_costs + offset, vectors);
+      path.load(state + offset, vectors);
+      next.advance(path, c, [&](int r, Vector value) { value.store(kept_values + offset + r * N); });
+      path.store(state + offset, vectors);
+    }
+  }
+
+  // `c`: the costs of a pixel of the row after, and then the averages of the row here.
+  static void averageRows(const CensusCostRows& rows, std::ptrdiff_t offset, int vectors, Values& c) {
+    for (int r = 0; r < vectors; ++r) {
+      const Vector here = Vector::load(rows.here + offset + r * N);
+      const Vector before = Vector::load(rows.beside + offset + r * N);
+      c.of[r].store(rows.beside + offset + r * N);
+      c.of[r] = average(average(before, c.of[r]), here);
+    }
+  }
 
   // The costs of all disparities of the pixels of row y, from x on, one pixel after the other.
   class Costs {
@@ -344,12 +386,16 @@ struct CensusPathsDispatch {
     }
   }
 
-  static void step(const CensusPathsInput& input, int y, int x_begin, int x_end, std::uint8_t* state) {
-    with(input.vectors, [&](auto loops) { loops.step(input, y, x_begin, x_end, state); });
+  static void findCosts(const CensusPathsInput& input, int y, int x_begin, int x_end, std::uint8_t* costs) {
+    with(input.vectors, [&](auto loops) { loops.findCosts(input, y, x_begin, x_end, costs); });
   }
-  static void stepAndKeep(const CensusPathsInput& input, int y, std::uint8_t* state, std::uint8_t* costs,
-                          std::uint8_t* values) {
-    with(input.vectors, [&](auto loops) { loops.stepAndKeep(input, y, state, costs, values); });
+  static void step(const CensusPathsInput& input, int y, int x_begin, int x_end, const CensusCostRows& rows,
+                   std::uint8_t* state) {
+    with(input.vectors, [&](auto loops) { loops.step(input, y, x_begin, x_end, rows, state); });
+  }
+  static void stepAndKeep(const CensusPathsInput& input, int y, const CensusCostRows& rows,
+                          std::uint8_t* state, std::uint8_t* costs, std::uint8_t* values) {
+    with(input.vectors, [&](auto loops) { loops.stepAndKeep(input, y, rows, state, costs, values); });
   }
   static void addPaths(const CensusPathsInput& input, const std::uint8_t* costs, std::uint8_t* state,
                        std::uint8_t* sums, const std::uint8_t* costs_before, std::uint8_t* sums_before) {
@@ -361,7 +407,8 @@ struct CensusPathsDispatch {
     with(input.vectors, [&](auto loops) { loops.findWinners(input, sums, winners); });
   }
 
-  static constexpr CensusPathsFunctions FUNCTIONS = {Vector::LANES, step, stepAndKeep, addPaths, findWinners};
+  static constexpr CensusPathsFunctions FUNCTIONS = {Vector::LANES, findCosts, step,
+                                                     stepAndKeep,   addPaths,  findWinners};
 };
 
 }  // namespace

@@ -28,6 +28,43 @@ const CensusPathsFunctions& functionsFor(CensusSgm::Vectors vectors) {
   return is_wide ? *wide : censusPaths16();
 }
 
+// What the steps of a vertical path need for averages over rows. The path visits row after row.
+class CostRows {
+ public:
+  // direction: 1 downwards, -1 upwards.
+  CostRows(const CensusPathsFunctions& functions, const CensusPathsInput& input, const cv::Range& columns,
+           int direction, cv::Mat& buffer)
+      : functions_(functions),
+        input_(input),
+        columns_(columns),
+        direction_(direction),
+        here_(buffer.ptr<std::uint8_t>(0)),
+        beside_(buffer.ptr<std::uint8_t>(1)) {}
+
+  // Of any row y, and then of y + direction, y + 2 direction...
+  CensusCostRows at(int y) {
+    if (!input_.aggregate_rows) return {};
+    if (is_first_) {
+      functions_.findCosts(input_, y, columns_.start, columns_.end, here_);
+      functions_.findCosts(input_, inside(y - direction_), columns_.start, columns_.end, beside_);
+      is_first_ = false;
+    } else {
+      std::swap(here_, beside_);
+    }
+    return {here_, beside_, inside(y + direction_)};
+  }
+
+ private:
+  int inside(int y) const { return std::clamp(y, 0, input_.height - 1); }
+
+  const CensusPathsFunctions& functions_;
+  const CensusPathsInput& input_;
+  const cv::Range columns_;
+  const int direction_;
+  std::uint8_t *here_, *beside_;
+  bool is_first_ = true;
+};
+
 }  // namespace
 
 static_assert(CensusSgmParameters::MAX_P2 + MAX_CENSUS_COST == 255, "path values are bytes");
@@ -113,10 +150,13 @@ void CensusSgm::mirror(const cv::Mat (&planes)[3], int min_disparity, int thread
   });
 }
 
-void CensusSgm::sweep(const CensusPathsInput& input, int height, int threads) {
-  const int blocks = blocksOf(height);
+void CensusSgm::sweep(const CensusPathsInput& input, int threads) {
+  const int blocks = blocksOf(input.height);
   const std::ptrdiff_t bytes = std::ptrdiff_t{vectors_} * functions_->lanes;
-  for (Strip& strip : strips_) strip.state.create(1, states_.cols, CV_8UC1);
+  for (Strip& strip : strips_) {
+    strip.state.create(1, states_.cols, CV_8UC1);
+    strip.cost_rows.create(2, states_.cols, CV_8UC1);
+  }
   states_.row(blocks - 1) = 0;
   strips_[0].state = 0;
   forEachStrip(threads, [&](int i) {
@@ -124,22 +164,23 @@ void CensusSgm::sweep(const CensusPathsInput& input, int height, int threads) {
     const auto copy = [&](const std::uint8_t* from, std::uint8_t* to) {
       std::copy(from + columns.start * bytes, from + columns.end * bytes, to + columns.start * bytes);
     };
+    const auto step = [&](CostRows& rows, int y, std::uint8_t* state) {
+      functions_->step(input, y, columns.start, columns.end, rows.at(y), state);
+    };
+    CostRows upwards(*functions_, input, columns, -1, strips_[i].cost_rows);
     for (int block = blocks - 1; block > 0; --block) {
       std::uint8_t* state = states_.ptr<std::uint8_t>(block - 1);
       copy(states_.ptr<std::uint8_t>(block), state);
-      const cv::Range rows = rowsOf(block, height);
-      for (int y = rows.end - 1; y >= rows.start; --y) {
-        functions_->step(input, y, columns.start, columns.end, state);
-      }
+      const cv::Range rows = rowsOf(block, input.height);
+      for (int y = rows.end - 1; y >= rows.start; --y) step(upwards, y, state);
     }
     // Where the strips of rows begin.
+    CostRows downwards(*functions_, input, columns, 1, strips_[i].cost_rows);
     for (int strip = 1; strip < threads; ++strip) {
       std::uint8_t* state = strips_[strip].state.ptr<std::uint8_t>();
       copy(strips_[strip - 1].state.ptr<std::uint8_t>(), state);
       const cv::Range part = stripOf(blocks, strip - 1, threads);
-      for (int y = part.start * BLOCK_ROWS; y < part.end * BLOCK_ROWS; ++y) {
-        functions_->step(input, y, columns.start, columns.end, state);
-      }
+      for (int y = part.start * BLOCK_ROWS; y < part.end * BLOCK_ROWS; ++y) step(downwards, y, state);
     }
   });
 }
@@ -149,8 +190,9 @@ void CensusSgm::computeBlock(const CensusPathsInput& input, const CensusSgmParam
   const auto costs = [&](int y) { return strip.costs.ptr<std::uint8_t>(y - rows.start); };
   const auto sums = [&](int y) { return strip.sums.ptr<std::uint8_t>(y - rows.start); };
   std::uint8_t* from_above = strip.state.ptr<std::uint8_t>();
+  CostRows upwards(*functions_, input, {0, input.width}, -1, strip.cost_rows);
   for (int y = rows.end - 1; y >= rows.start; --y) {
-    functions_->stepAndKeep(input, y, state, costs(y), sums(y));
+    functions_->stepAndKeep(input, y, upwards.at(y), state, costs(y), sums(y));
   }
   functions_->addPaths(input, costs(rows.start), from_above, sums(rows.start), nullptr, nullptr);
   for (int y = rows.start + 1; y < rows.end; ++y) {
@@ -200,6 +242,7 @@ void CensusSgm::compute(const cv::Mat& left, const cv::Mat& right, const CensusS
 
   CensusPathsInput input{};
   input.width = size.width;
+  input.height = size.height;
   input.disparities = parameters.disparity_range;
   input.min_disparity = parameters.min_disparity;
   input.vectors = vectors_;
@@ -218,9 +261,10 @@ void CensusSgm::compute(const cv::Mat& left, const cv::Mat& right, const CensusS
   input.place = place_.data();
   input.p1 = static_cast<std::uint8_t>(parameters.p1);
   input.p2 = static_cast<std::uint8_t>(parameters.p2);
+  input.aggregate_rows = parameters.aggregate_rows;
   input.ambiguous = ambiguous_.empty() ? nullptr : ambiguous_.data();
 
-  sweep(input, size.height, threads);
+  sweep(input, threads);
   unchecked_.create(size, CV_16SC1);
   is_bad_.create(size, CV_8UC1);
   forEachStrip(threads, [&](int i) {

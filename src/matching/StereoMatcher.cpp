@@ -43,6 +43,7 @@ CensusSgmParameters censusParameters(const MatchingParameters& p) {
   if (p.P2 > 0) census.p2 = p.P2;
   census.uniqueness_ratio = p.uniqueness_ratio;
   census.disp12_max_diff = p.disp12MaxDiff;
+  census.aggregate_rows = p.aggregate_rows;
   return census;
 }
 
@@ -50,7 +51,7 @@ auto members(const MatchingParameters& p) {
   return std::tie(p.stereo_algorithm, p.sgbm_mode, p.prefilter_size, p.prefilter_cap,
                   p.correlation_window_size, p.min_disparity, p.disparity_range, p.uniqueness_ratio,
                   p.texture_threshold, p.speckle_size, p.speckle_range, p.P1, p.P2, p.disp12MaxDiff,
-                  p.full_width);
+                  p.full_width, p.aggregate_rows);
 }
 
 cv::Ptr<cv::StereoMatcher> createBlockMatcher(const MatchingParameters& p) {

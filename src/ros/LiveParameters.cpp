@@ -71,6 +71,7 @@ MatchingParameters toParameters(DisparityConfig& config) {
   parameters.P2 = config.P2;
   parameters.disp12MaxDiff = config.disp12MaxDiff;
   parameters.full_width = config.full_width;
+  parameters.aggregate_rows = config.aggregate_rows;
   return parameters;
 }
 

@@ -146,6 +146,7 @@ void StageParameters::setMode(const std::string& mode) {
   plane_refinement_.refinement_mode =
       static_cast<int>(mode == "quality" ? RefinementMode::QUALITY : RefinementMode::PAPER);
   disparity_.full_width = mode != "paper";
+  disparity_.aggregate_rows = mode == "quality";
   if (mode == "fast") disparity_.stereo_algorithm = static_cast<int>(StereoAlgorithm::CENSUS_SGM);
 }
 
@@ -215,7 +216,7 @@ void StageParameters::addOptions(po::options_description& description) {
   addFileOption(description);
   description.add_options()("mode", po::value<std::string>()->value_name("MODE"),
                             "paper (default); fast: the census matcher, full_width; quality: the refinement "
-                            "beyond the paper, full_width. File and options win over it");
+                            "beyond the paper, full_width, aggregate_rows. File and options win over it");
   addConfigOptions<DisparityConfig>(description);
   addConfigOptions<SegmentationConfig>(description);
   addConfigOptions<PlaneRefinementConfig>(description);

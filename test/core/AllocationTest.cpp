@@ -109,6 +109,7 @@ TEST_F(Allocation, isDoneByTheCensusMatcherForTheFirstFrameOnly) {
       parameters.stereo_algorithm = StereoAlgorithm::CENSUS_SGM;
       parameters.disparity_range = disparity_range;
       parameters.full_width = full_width;
+      parameters.aggregate_rows = !full_width;
       StereoMatcher matcher(parameters);
       cv::Mat disparity(frames[0].left.size(), CV_32FC1);
       matcher.compute(frames[0].left, frames[0].right, disparity);

@@ -96,7 +96,7 @@ std::string describe(const cv::Size& size, const CensusSgmParameters& p) {
   return std::to_string(size.width) + "x" + std::to_string(size.height) +
          text("disparity_range", p.disparity_range) + text("min_disparity", p.min_disparity) +
          text("P1", p.p1) + text("P2", p.p2) + text("uniqueness_ratio", p.uniqueness_ratio) +
-         text("disp12_max_diff", p.disp12_max_diff);
+         text("disp12_max_diff", p.disp12_max_diff) + text("aggregate_rows", p.aggregate_rows);
 }
 
 bool sameBits(const cv::Mat& a, const cv::Mat& b) {
@@ -194,6 +194,7 @@ TEST(CensusSgm, equalsTheReferenceForRandomParameters) {
     p.p1 = pairs.oneOf<int>({0, std::min(6, p.p2), p.p2, pairs.number(0, p.p2 + 1)});
     p.uniqueness_ratio = pairs.oneOf<int>({0, 1, 10, 50, 99});
     p.disp12_max_diff = pairs.oneOf<int>({-1, 0, 1, 5});
+    p.aggregate_rows = pairs.number(0, 2) == 1;
     const cv::Size size(pairs.number(1, 70), pairs.number(1, 60));
     const StereoPair pair = pairs.any(size, p);
     matchers.expectReference(pair, p, pairs.number(1, 4));
@@ -221,9 +222,10 @@ TEST(CensusSgm, equalsTheReferenceWhereAllSumsAreCut) {
 TEST(CensusSgm, isTheSameForAnyNumberOfThreads) {
   RandomPairs pairs(6);
   const int threads_before = cv::getNumThreads();
+  CensusSgmParameters p = parametersOf(48, -3);
+  p.uniqueness_ratio = 5;
   for (const cv::Size& size : {cv::Size(90, 200), cv::Size(2, 100), cv::Size(120, 30)}) {
-    CensusSgmParameters p = parametersOf(48, -3);
-    p.uniqueness_ratio = 5;
+    p.aggregate_rows = !p.aggregate_rows;
     const StereoPair pair = pairs.any(size, p);
     const cv::Mat expected = straightforward::matchCensus(pair.left, pair.right, p);
     CensusSgm reused;

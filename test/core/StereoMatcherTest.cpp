@@ -175,6 +175,7 @@ TEST(StereoMatcher, equalsTheCensusMatcherAndTheSpeckleFilter) {
   census.p2 = 50;
   census.uniqueness_ratio = 20;
   census.disp12_max_diff = 2;
+  census.aggregate_rows = true;
   cv::Mat fixed_point, expected, map, buffer;
   CensusSgm().compute(pair.left, pair.right, census, fixed_point);
   cv::filterSpeckles(fixed_point, CensusSgm::INVALID, 40, 3 * CensusSgm::SUBPIXEL_STEPS, buffer);
@@ -190,6 +191,7 @@ TEST(StereoMatcher, equalsTheCensusMatcherAndTheSpeckleFilter) {
   p.speckle_size = 40;
   p.speckle_range = 3;
   p.full_width = true;
+  p.aggregate_rows = true;
   StereoMatcher(p).compute(pair.left, pair.right, map);
   EXPECT_TRUE(sameBits(map, expected));
   const auto valid = static_cast<std::size_t>(cv::countNonZero(map >= -3.0F));

@@ -90,6 +90,7 @@ CoreParameters defaultParameters() {
   CoreParameters parameters;
   parameters.matching.disparity_range = 64;
   parameters.matching.full_width = true;
+  parameters.matching.aggregate_rows = true;
   parameters.refinement.mode = RefinementMode::QUALITY;
   return parameters;
 }

@@ -31,6 +31,7 @@ TEST(LiveParameters, matchingDefaultsAreThoseOfTheCore) {
   EXPECT_EQ(live.P2, core.P2);
   EXPECT_EQ(live.disp12MaxDiff, core.disp12MaxDiff);
   EXPECT_EQ(live.full_width, core.full_width);
+  EXPECT_EQ(live.aggregate_rows, core.aggregate_rows);
 }
 
 TEST(LiveParameters, segmentationDefaultsAreThoseOfTheCore) {

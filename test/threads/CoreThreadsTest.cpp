@@ -44,6 +44,7 @@ MatchingParameters matchingParameters(StereoAlgorithm algorithm) {
   parameters.stereo_algorithm = algorithm;
   parameters.disparity_range = 64;
   parameters.full_width = true;
+  parameters.aggregate_rows = true;
   return parameters;
 }
 

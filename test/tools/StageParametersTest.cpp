@@ -40,11 +40,13 @@ TEST(StageParameters, haveTheModesOfTheLaunchFiles) {
   EXPECT_EQ(parameters.refinement().mode, RefinementMode::PAPER);
   parameters.setMode("quality");
   EXPECT_TRUE(parameters.matching().full_width);
+  EXPECT_TRUE(parameters.matching().aggregate_rows);
   EXPECT_EQ(parameters.matching().stereo_algorithm, StereoAlgorithm::SGBM);
   EXPECT_EQ(parameters.refinement().mode, RefinementMode::QUALITY);
   parameters = {};
   parameters.setMode("fast");
   EXPECT_TRUE(parameters.matching().full_width);
+  EXPECT_FALSE(parameters.matching().aggregate_rows);
   EXPECT_EQ(parameters.matching().stereo_algorithm, StereoAlgorithm::CENSUS_SGM);
   EXPECT_EQ(parameters.refinement().mode, RefinementMode::PAPER);
   parameters = {};

@@ -68,19 +68,26 @@ Volume costsOfPairs(const cv::Mat& left, const cv::Mat& right, const CensusSgmPa
 
 int halfOf(int sum) { return (sum + 1) / 2; }
 
-Volume costsOf(const cv::Mat& left, const cv::Mat& right, const CensusSgmParameters& p) {
-  const Volume pairs = costsOfPairs(left, right, p);
-  Volume costs(left.size(), p.disparity_range);
-  for (int y = 0; y < left.rows; ++y) {
-    for (int x = 0; x < left.cols; ++x) {
-      const int before = std::max(x - 1, 0), after = std::min(x + 1, left.cols - 1);
-      for (int d = 0; d < p.disparity_range; ++d) {
-        const int beside = halfOf(pairs.at(before, y, d) + pairs.at(after, y, d));
-        costs.at(x, y, d) = halfOf(beside + pairs.at(x, y, d));
+/// Half of every cost and half of the mean of those at (x - dx, y - dy) and (x + dx, y + dy).
+Volume averages(const Volume& costs, const cv::Size& size, int disparities, int dx, int dy) {
+  Volume result(size, disparities);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      const int x_before = std::max(x - dx, 0), x_after = std::min(x + dx, size.width - 1);
+      const int y_before = std::max(y - dy, 0), y_after = std::min(y + dy, size.height - 1);
+      for (int d = 0; d < disparities; ++d) {
+        const int beside = halfOf(costs.at(x_before, y_before, d) + costs.at(x_after, y_after, d));
+        result.at(x, y, d) = halfOf(beside + costs.at(x, y, d));
       }
     }
   }
-  return costs;
+  return result;
+}
+
+Volume costsOf(const cv::Mat& left, const cv::Mat& right, const CensusSgmParameters& p) {
+  const cv::Size size = left.size();
+  const Volume costs = averages(costsOfPairs(left, right, p), size, p.disparity_range, 1, 0);
+  return p.aggregate_rows ? averages(costs, size, p.disparity_range, 0, 1) : costs;
 }
 
 /// Adds the values of the path that comes to every pixel from (x - dx, y - dy).

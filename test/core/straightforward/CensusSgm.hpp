@@ -21,8 +21,8 @@ cv::Mat censusSlope(const cv::Mat& gray);
 /// - Cost of a pair of pixels: differing census bits plus difference of the slopes; 10 where the right one is
 ///   outside of its image.
 /// - Cost of a pixel and a disparity: half of the pair's cost and half of the mean of those of the pixels to
-///   the left and right, each rounded upwards; at the border the pixel itself for the neighbour. A path
-///   begins with the cost.
+///   the left and right, each rounded upwards; at the border the pixel itself for the neighbour. With
+///   aggregate_rows the same again of these costs, with those above and below. A path begins with the cost.
 /// - A sum counts 255 at most.
 /// - A disparity is ambiguous if uniqueness_ratio > 0 and any disparity that is not next to it has the same
 ///   sum, or one with sum (100 - uniqueness_ratio) < 100 times the least sum.
