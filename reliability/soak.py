@@ -69,12 +69,14 @@ def plane_refinement():
     ])
 
 
-# What takes most memory: buffers are kept between frames.
+# What takes most memory: buffers are kept between frames. Among them those of all pixels that have a disparity.
 LARGEST = {
-    "disparity": {"sgbm_mode": 1, "min_disparity": 0, "disparity_range": 160, "full_width": True},
+    "disparity": {"sgbm_mode": 1, "min_disparity": -8, "disparity_range": 160, "correlation_window_size": 11, "full_width": True,
+                  "aggregate_rows": True, "uniqueness_ratio": 0, "texture_threshold": 0, "disp12MaxDiff": -1,
+                  "speckle_size": 1, "speckle_range": 0},
     "segmentation": {"lambda": 0, "h": 0, "connectivity": 4, "structuring_element": 0,
                      "shadow_enhancement": True, "shadow_threshold": 50, "shadow_gamma": 0.05},
-    "plane_refinement": {"refinement_mode": 1, "further_segmentations": 2},
+    "plane_refinement": {"refinement_mode": 1, "further_segmentations": 2, "min_valid_fraction": 0.0, "min_valid_points": 3},
 }
 
 
