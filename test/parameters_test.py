@@ -41,6 +41,14 @@ class Parameters(unittest.TestCase):
         passed_on = set(re.findall(r'<arg name="(\w+)" value="\$\(arg \1\)"/>', bag))
         self.assertEqual(passed_on, names - excepted)
 
+    def test_those_of_the_readme_are_launch_arguments(self):
+        readme = (ROOT / "README.md").read_text()
+        launch = (ROOT / "launch" / "stereo_refinement.launch").read_text()
+        rows = re.findall(r"^\| `(\w+)` \|.*\| (?:yes|no) \|", readme.split("\n## Parameters\n")[1].split("\n## ")[0], re.MULTILINE)
+        self.assertGreater(len(rows), 50)
+        for name in rows:
+            self.assertIn('<arg name="%s" default=""' % name, launch)
+
     def test_each_is_in_the_readme_with_its_default(self):
         readme = (ROOT / "README.md").read_text()
         for nodelet, name, default in parameters():

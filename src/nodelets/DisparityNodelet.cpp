@@ -50,7 +50,7 @@ class DisparityNodelet : public LazyNodelet {
         queue_size, *monitor_, [this](const StereoFrame& frame) { process(frame); },
         [this] { return flow_control_->delay(ros::SteadyTime::now()); });
     subscriber_ = std::make_unique<StereoSubscriber>(
-        nh, private_nh, *monitor_, [this](const StereoFrame& frame) { worker_->push(frame); });
+        nh, private_nh, queue_size, *monitor_, [this](const StereoFrame& frame) { worker_->push(frame); });
     publisher_ = advertise<stereo_msgs::DisparityImage>(nh, "disparity");
     parameters_publisher_ = nh.advertise<FrameParameters>("disparity_parameters", PUBLISHER_QUEUE_SIZE);
     monitor_->start();

@@ -14,7 +14,7 @@ namespace disparity_refinement {
 namespace {
 
 /// Left and right may run apart by a few messages, however few frames may wait for the stage.
-constexpr int MIN_QUEUE_SIZE = 30;
+constexpr std::size_t MIN_QUEUE_SIZE = 30;
 
 /// In the order of InputIndex.
 constexpr std::array<const char*, 4> NAMES = {"left/image_rect", "left/camera_info", "right/image_rect",
@@ -23,18 +23,18 @@ constexpr std::array<const char*, 4> NAMES = {"left/image_rect", "left/camera_in
 }  // namespace
 
 StereoSubscriber::StereoSubscriber(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
-                                   StageMonitor& monitor, Callback callback)
+                                   std::size_t queue_size, StageMonitor& monitor, Callback callback)
     : nh_(nh),
       private_nh_(private_nh),
       monitor_(monitor),
       callback_(std::move(callback)),
       approximate_(startParameter(private_nh, "approximate_sync", false)),
       max_interval_(startParameter(private_nh, "approximate_sync_max_interval", 0.01, 1e-6, 3600.0)),
-      queue_size_(std::clamp(private_nh.param("queue_size", 1), MIN_QUEUE_SIZE, MAX_QUEUE_SIZE)),
+      queue_size_(std::max(queue_size, MIN_QUEUE_SIZE)),
       warning_period_(startParameter(private_nh, "sync_warning_period", 5.0, 0.1, 3600.0)),
       join_(
-          static_cast<std::size_t>(queue_size_), approximate_ ? max_interval_ : 0.0,
-          [this](const StereoFrame& frame) { pair(frame); }, [this](int images) { unpaired_ += images; }) {
+          queue_size_, approximate_ ? max_interval_ : 0.0, [this](const StereoFrame& frame) { pair(frame); },
+          [this](int images) { unpaired_ += images; }) {
   for (std::size_t i = 0; i < NAMES.size(); ++i) inputs_[i].topic = nh_.resolveName(NAMES[i]);
 
   monitor_.addDiagnostics([this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnose(status); });

@@ -2,6 +2,7 @@
 #include <sensor_msgs/Image.h>
 
 #include <boost/make_shared.hpp>
+#include <chrono>
 #include <thread>
 #include <vector>
 
@@ -14,7 +15,7 @@ using sensor_msgs::Image;
 
 class Gate : public testing::Test {
  protected:
-  static constexpr double LONG = 100.0, SHORT = 0.01;  // [s]
+  static constexpr double LONG = 100.0, SHORT = 0.05;  // [s]
 
   explicit Gate(double patience = LONG)
       : gate_(
@@ -29,6 +30,8 @@ class Gate : public testing::Test {
     image->header.stamp = ros::Time(stamp, 0);
     gate_.addFrame(image);
   }
+
+  static void pause(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 
   void announce(int stamp) { gate_.announce(ros::Time(stamp, 0)); }
 
@@ -110,11 +113,30 @@ TEST_F(Gate, forgetsTheAnnouncementOfAFrameThatHasPassed) {
   EXPECT_EQ(emitted_, (Stamps{1, 2, 3, 1}));
 }
 
+TEST_F(ImpatientGate, waitsLongerForASlowStageButNotForever) {
+  announce(0);
+  pause(4.0 * SHORT);
+  announce(1);
+  add(2);
+  pause(2.0 * SHORT);
+  gate_.expire();
+  EXPECT_EQ(emitted_, Stamps());
+  pause(8.0 * SHORT);
+  gate_.expire();
+  EXPECT_EQ(emitted_, (Stamps{2}));
+  // The pause was no work.
+  pause(10.0 * SHORT);
+  announce(3);
+  add(4);
+  pause(12.0 * SHORT);
+  gate_.expire();
+  EXPECT_EQ(emitted_, (Stamps{2, 4}));
+}
+
 TEST_F(ImpatientGate, opensWhenTheAnnouncementsEnd) {
-  const auto pause = [] { std::this_thread::sleep_for(std::chrono::duration<double>(2.0 * SHORT)); };
   announce(0);
   add(1);
-  pause();
+  pause(2.0 * SHORT);
   gate_.expire();
   EXPECT_EQ(emitted_, (Stamps{1}));
   add(2);

@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "disparity_refinement/ros/FlowControl.hpp"
 #include "disparity_refinement/ros/FrameGate.hpp"
 #include "disparity_refinement/ros/FrameWorker.hpp"
 #include "disparity_refinement/ros/LiveParameters.hpp"
@@ -116,6 +117,34 @@ TEST(RosThreads, workOnFramesWhileTheyAreCounted) {
 }
 
 constexpr int FRAMES = 500;
+
+TEST(RosThreads, matchAFrameWhenTheOneBeforeIsRefined) {
+  FlowControl flow(1, 2);
+  StageMonitor monitor("threads", ros::NodeHandle("~flow"), ros::NodeHandle("~flow"));
+  std::atomic<int> matched{0};
+  int refined = 0;
+  {
+    FrameWorker<int> worker(
+        FRAMES, monitor,
+        [&](const int& frame) {
+          flow.matched(ros::Time(frame, 0), 1e-4, ros::SteadyTime::now());
+          matched = frame;
+        },
+        [&] { return flow.delay(ros::SteadyTime::now()); });
+    runThreads(2, [&](int i) {
+      for (int frame = 1; i == 0 && frame <= FRAMES; ++frame) worker.push(frame);
+      while (i == 1 && refined < FRAMES) {
+        if (const int frame = matched; frame > refined) {
+          refined = frame;
+          flow.refined(ros::Time(frame, 0), ros::SteadyTime::now());
+          worker.wake();
+        }
+        std::this_thread::yield();
+      }
+    });
+  }
+  EXPECT_EQ(matched, FRAMES);
+}
 
 sensor_msgs::ImagePtr imageOf(int frame) {
   const auto image = boost::make_shared<sensor_msgs::Image>();

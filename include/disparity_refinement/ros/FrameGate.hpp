@@ -28,7 +28,9 @@ class FrameGate {
   /// Called with the number of frames that were not announced.
   using Drop = std::function<void(int)>;
 
-  /// @param patience  How long after the last announcement frames wait for theirs.
+  /// @param patience  How long after the last announcement frames wait for theirs: for three times as long
+  ///                  as the last two announcements were apart, but for no less than this and no more than
+  ///                  ten times this.
   FrameGate(std::size_t capacity, const ros::WallDuration& patience, Emit emit, Drop drop)
       : capacity_(capacity), patience_(patience), emit_(std::move(emit)), drop_(std::move(drop)) {}
 
@@ -51,7 +53,9 @@ class FrameGate {
   /// any more.
   void announce(const ros::Time& stamp) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    last_announcement_ = ros::SteadyTime::now();
+    const ros::SteadyTime now = ros::SteadyTime::now();
+    if (last_announcement_) interval_ = now - *last_announcement_;
+    last_announcement_ = now;
     const auto found = std::find_if(waiting_.rbegin(), waiting_.rend(), [&stamp](const MessagePtr& frame) {
       return frame->header.stamp == stamp;
     });
@@ -76,7 +80,8 @@ class FrameGate {
 
  private:
   bool isClosed() const {
-    return last_announcement_ && ros::SteadyTime::now() - *last_announcement_ < patience_;
+    return last_announcement_ && ros::SteadyTime::now() - *last_announcement_ <
+                                     std::clamp(interval_ * 3.0, patience_, patience_ * 10.0);
   }
 
   void passUnannounced(const MessagePtr& frame) {
@@ -103,6 +108,7 @@ class FrameGate {
   const Drop drop_;
   std::mutex mutex_;
   std::optional<ros::SteadyTime> last_announcement_;
+  ros::WallDuration interval_;  ///< Between the last two.
   std::deque<MessagePtr> waiting_;
   std::deque<ros::Time> announced_;  ///< Frames that have not come yet.
   std::deque<ros::Time> passed_;     ///< Frames that did not wait for their announcement.

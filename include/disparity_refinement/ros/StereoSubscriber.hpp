@@ -5,6 +5,7 @@
 #include <sensor_msgs/Image.h>
 
 #include <array>
+#include <cstddef>
 #include <functional>
 #include <string>
 
@@ -17,19 +18,19 @@ namespace disparity_refinement {
 /// Synchronizes left/image_rect, left/camera_info, right/image_rect and right/camera_info.
 ///
 /// Parameters on the private handle: ~approximate_sync (false), ~approximate_sync_max_interval [s] (0.01),
-/// ~queue_size [frames] (1), ~sync_warning_period [s] (5), ~image_transport (raw).
+/// ~sync_warning_period [s] (5), ~image_transport (raw).
 ///
 /// - Messages without a time of exposure are refused with an error, see ImageSubscriber.
 /// - Images without a partner are counted.
 /// - Messages without a pair for a whole warning period: a warning says how many came on each topic, how far
-/// the
-///   stamps are apart and what to do.
+///   the stamps are apart and what to do.
 class StereoSubscriber {
  public:
   using Callback = std::function<void(const StereoFrame&)>;
 
-  StereoSubscriber(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, StageMonitor& monitor,
-                   Callback callback);
+  /// @param queue_size  Frames that may wait for the stage: so many messages wait for their partners, or 30.
+  StereoSubscriber(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, std::size_t queue_size,
+                   StageMonitor& monitor, Callback callback);
 
   ~StereoSubscriber();
 
@@ -75,7 +76,7 @@ class StereoSubscriber {
   const Callback callback_;
   const bool approximate_;
   const double max_interval_;
-  const int queue_size_;
+  const std::size_t queue_size_;
   const double warning_period_;
 
   std::array<Input, 4> inputs_;
