@@ -24,7 +24,8 @@ namespace {
 using sensor_msgs::Image;
 using stereo_msgs::DisparityImage;
 
-const std::vector<std::string> NODELETS = {"disparity", "segmentation", "plane_refinement", "visualization"};
+const std::vector<std::string> NODELETS = {"disparity", "segmentation", "plane_refinement", "depth",
+                                           "visualization"};
 
 /// Those of start_stop.test.
 CoreParameters testParameters() {
@@ -64,10 +65,11 @@ class StartStop : public testing::Test {
   /// Whoever listens now hears of frames that are sent from now on.
   void expectFrames() {
     Listener<DisparityImage> refined(nh_, "disparity_refined");
-    Listener<Image> borders(nh_, "segment_borders");
+    Listener<Image> depth(nh_, "depth/image_rect"), borders(nh_, "segment_borders");
     const ros::Time now = camera_.lastStamp();
     const auto isNew = [&now](const auto& message) { return message.header.stamp > now; };
     EXPECT_TRUE(refined.wait(isNew)) << "no refined map";
+    EXPECT_TRUE(depth.wait(isNew)) << "no depth";
     EXPECT_TRUE(borders.wait(isNew)) << "no picture of the segments";
     EXPECT_EQ(camera_.countWrongPairs(refined), 0);
   }
@@ -107,14 +109,14 @@ TEST_F(StartStop, nodeletsAloneDoTheirShare) {
     load(nodelet);
     {
       Listener<DisparityImage> raw(nh_, "disparity"), refined(nh_, "disparity_refined");
-      Listener<Image> labels(nh_, "labels"), borders(nh_, "segment_borders");
+      Listener<Image> labels(nh_, "labels"), depth(nh_, "depth/image_rect"), borders(nh_, "segment_borders");
       const Driver driver(camera_);
       const bool is_done = waitFor([&] { return raw.count() + labels.count() > 3; },
                                    nodelet == "disparity" || nodelet == "segmentation" ? TIMEOUT : 1.0);
       EXPECT_EQ(is_done, nodelet == "disparity" || nodelet == "segmentation") << nodelet;
       EXPECT_EQ(raw.count() > 0, nodelet == "disparity") << nodelet;
       EXPECT_EQ(labels.count() > 0, nodelet == "segmentation") << nodelet;
-      EXPECT_EQ(refined.count() + borders.count(), 0U) << nodelet;
+      EXPECT_EQ(refined.count() + depth.count() + borders.count(), 0U) << nodelet;
     }
     unload(nodelet);
   }
@@ -143,7 +145,7 @@ TEST_F(StartStop, nodeletIsLoadedAgainAndAgain) {
   constexpr int TIMES = 10;
   for (const std::string& nodelet : NODELETS) load(nodelet);
   Listener<DisparityImage> refined(nh_, "disparity_refined");
-  const Listener<Image> borders(nh_, "segment_borders");
+  const Listener<Image> depth(nh_, "depth/image_rect"), borders(nh_, "segment_borders");
   const Driver driver(camera_);
   expectFrames();
   for (const std::string& nodelet : NODELETS) {
@@ -176,6 +178,7 @@ TEST_F(StartStop, listenersComeAndGoAThousandTimes) {
       [this](bool connect) { comeAndGo<Image>("confidence", connect); },
       [this](bool connect) { comeAndGo<DisparityImage>("disparity", connect); },
       [this](bool connect) { comeAndGo<Image>("labels", connect); },
+      [this](bool connect) { comeAndGo<Image>("depth/image_rect", connect); },
       [this](bool connect) { comeAndGo<Image>("disparity_color", connect); },
       [this](bool connect) { comeAndGo<Image>("segment_borders", connect); },
   };

@@ -81,13 +81,13 @@ TEST(ZeroCopy, everyEdgePassesThePointer) {
   nodelet::Loader loader(nh);
   const std::map<std::string, std::string> remappings;
   const std::vector<std::string> arguments;
-  for (const char* name : {"disparity", "segmentation", "plane_refinement", "visualization"}) {
+  for (const char* name : {"disparity", "segmentation", "plane_refinement", "depth", "visualization"}) {
     ASSERT_TRUE(loader.load(std::string("/stereo/") + name, std::string("disparity_refinement/") + name,
                             remappings, arguments));
   }
 
   Listener<DisparityImage> raw(nh, "disparity"), refined(nh, "disparity_refined");
-  Listener<Image> labels(nh, "labels"), raw_picture(nh, "disparity_color"),
+  Listener<Image> labels(nh, "labels"), depth(nh, "depth/image_rect"), raw_picture(nh, "disparity_color"),
       refined_picture(nh, "disparity_refined_color");
   Listener<Image> labels_picture(nh, "labels_color"), borders(nh, "segment_borders");
   // Small images: what counts is that there are many of them.
@@ -96,7 +96,7 @@ TEST(ZeroCopy, everyEdgePassesThePointer) {
   street.height = 48;
   street.focal_length = 80.0;
   StereoCamera camera(nh, street);
-  for (auto* picture : {&raw_picture, &refined_picture, &labels_picture, &borders}) {
+  for (auto* picture : {&depth, &raw_picture, &refined_picture, &labels_picture, &borders}) {
     ASSERT_TRUE(camera.waitForChain(*picture));
   }
 
@@ -105,7 +105,7 @@ TEST(ZeroCopy, everyEdgePassesThePointer) {
 
   for (int i = 0; i < FRAMES && !testing::Test::HasFailure(); ++i) {
     for (auto* listener : {&raw, &refined}) listener->clear();
-    for (auto* listener : {&labels, &raw_picture, &refined_picture, &labels_picture, &borders})
+    for (auto* listener : {&labels, &depth, &raw_picture, &refined_picture, &labels_picture, &borders})
       listener->clear();
     log.clear();
     const ros::Time stamp = camera.stamp(i);
@@ -115,7 +115,7 @@ TEST(ZeroCopy, everyEdgePassesThePointer) {
     const auto raw_message = raw.wait(stamp);
     const auto labels_message = labels.wait(stamp);
     const auto refined_message = refined.wait(stamp);
-    ASSERT_TRUE(raw_message && labels_message && refined_message && borders.wait(stamp));
+    ASSERT_TRUE(raw_message && labels_message && refined_message && depth.wait(stamp) && borders.wait(stamp));
 
     // Into the chain: from the pointer that was published.
     const std::string left = address(sent.left->data);
@@ -134,6 +134,7 @@ TEST(ZeroCopy, everyEdgePassesThePointer) {
     EXPECT_EQ(log.find("visualization", "received", "labels", stamp), labels_address);
     const std::string refined_address = log.find("plane_refinement", "published", "disparity_refined", stamp);
     EXPECT_EQ(log.find("visualization", "received", "disparity_refined", stamp), refined_address);
+    EXPECT_EQ(log.find("depth", "received", "disparity_refined", stamp), refined_address);
 
     // Out of the chain: to a subscriber in the same process.
     EXPECT_EQ(address(raw_message->image.data), disparity);
