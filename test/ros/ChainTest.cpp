@@ -32,6 +32,7 @@ CoreParameters testParameters() {
   if (ros::param::param("~quality", false)) {
     parameters.matching.stereo_algorithm = StereoAlgorithm::CENSUS_SGM;
     parameters.matching.full_width = true;
+    parameters.matching.aggregate_rows = true;
     parameters.refinement.mode = RefinementMode::QUALITY;
   }
   return parameters;
@@ -231,6 +232,8 @@ TEST_F(Chain, planesTakeTheParametersOfTheirFrameAlong) {
     EXPECT_EQ(valueOf(message->segmentation_parameters.ints, "h"), 3);
     EXPECT_EQ(valueOf(message->disparity_parameters.ints, "disparity_range"), 64);
     EXPECT_EQ(valueOf(message->disparity_parameters.bools, "full_width"), expected.matching.full_width);
+    EXPECT_EQ(valueOf(message->disparity_parameters.bools, "aggregate_rows"),
+              expected.matching.aggregate_rows);
     EXPECT_EQ(valueOf(message->refinement_parameters.ints, "refinement_mode"),
               static_cast<int>(expected.refinement.mode));
     EXPECT_EQ(valueOf(message->refinement_parameters.doubles, "min_valid_fraction"), 0.3);

@@ -30,6 +30,7 @@ class Respawn : public testing::Test {
     parameters.matching.stereo_algorithm = StereoAlgorithm::CENSUS_SGM;
     parameters.matching.disparity_range = 64;
     parameters.matching.full_width = true;
+    parameters.matching.aggregate_rows = true;
     parameters.refinement.mode = RefinementMode::QUALITY;
     return parameters;
   }
