@@ -6,6 +6,7 @@ import pathlib
 import random
 import shutil
 import signal
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -69,7 +70,7 @@ def plane_refinement():
     ])
 
 
-# What takes most memory: buffers are kept between frames. Among them those of all pixels that have a disparity.
+# What takes most memory, among it buffers of all pixels that have a disparity.
 LARGEST = {
     "disparity": {"sgbm_mode": 1, "min_disparity": -8, "disparity_range": 160, "correlation_window_size": 11, "full_width": True,
                   "aggregate_rows": True, "uniqueness_ratio": 0, "texture_threshold": 0, "disp12MaxDiff": -1,
@@ -157,13 +158,13 @@ def soak(seconds, rate, folder, port):
     memory, changes = [], 0
 
     def settled_memory():
-        """That depends on the parameters: they are always the same here."""
+        """That depends on the parameters, which are always the same here, and a little on the frames under way."""
         chain.reset()
         samples = []
         for _ in range(int(SETTLING)):
             time.sleep(1.0)
             samples.append(resident_megabytes(pid))
-        return max(samples[len(samples) // 2:])
+        return statistics.median(samples[len(samples) // 2:])
 
     def fill_buffers(some_seconds):
         for algorithm in range(3):

@@ -84,7 +84,8 @@ class DisparityNodelet : public LazyNodelet {
     const auto snapshot = parameters_->snapshot();
     // Now, for whoever works for the frames that are matched alone.
     publishParameters(parameters_publisher_, frame.left->header, snapshot->message);
-    matcher_.setParameters(snapshot->parameters);
+    if (snapshot != snapshot_) matcher_ = StereoMatcher(snapshot->parameters);
+    snapshot_ = snapshot;
     warnAboutFrameIds(frame);
 
     const StereoGeometry geometry = geometryOf(frame);
@@ -142,6 +143,7 @@ class DisparityNodelet : public LazyNodelet {
 
   std::unique_ptr<StageMonitor> monitor_;
   std::unique_ptr<LiveParameters<DisparityConfig>> parameters_;
+  std::shared_ptr<const LiveParameters<DisparityConfig>::Snapshot> snapshot_;  // Of the frame before.
   StereoMatcher matcher_;
   bool warned_about_frame_ids_ = false;
   ros::Publisher publisher_, parameters_publisher_;

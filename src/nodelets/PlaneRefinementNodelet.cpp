@@ -67,11 +67,12 @@ class PlaneRefinementNodelet : public LazyNodelet {
     ros::NodeHandle& private_nh = getPrivateNodeHandle();
     monitor_ = std::make_unique<StageMonitor>(getName(), nh, private_nh);
     parameters_ = std::make_unique<LiveParameters<PlaneRefinementConfig>>(private_nh, [this] { update(); });
-    queue_size_ = startParameter(private_nh, "queue_size", 1, 1, MAX_QUEUE_SIZE);
+    const auto queue_size =
+        static_cast<std::size_t>(startParameter(private_nh, "queue_size", 1, 1, MAX_QUEUE_SIZE));
     min_density_ = startParameter(private_nh, "diagnostics_min_density", 0.0, 0.0, 1.0);
     const auto cache_size =
         static_cast<std::size_t>(startParameter(private_nh, "cache_size", 30, 1, MAX_QUEUE_SIZE));
-    worker_ = std::make_unique<FrameWorker<Frame>>(queue_size_, *monitor_, [this](const Frame& frame) {
+    worker_ = std::make_unique<FrameWorker<Frame>>(queue_size, *monitor_, [this](const Frame& frame) {
       // In whatever way it ends.
       const std::shared_ptr<void> announcement(nullptr, [&](void* /*unused*/) {
         done_publisher_.publish(boost::make_shared<std_msgs::Header>(frame.disparity->header));
@@ -184,6 +185,7 @@ class PlaneRefinementNodelet : public LazyNodelet {
                                   INPUT_QUEUE_SIZE, *monitor_,
                                   [this](const Image::ConstPtr& image) { image_join_->addMessage(image); });
       is_image_needed_ = true;
+      without_image_lately_ = 0;
     } catch (const std::exception& e) {
       monitor_->error("cannot subscribe to " + getNodeHandle().resolveName("left/image_rect") +
                       ", refining as in the paper: " + e.what());
@@ -199,6 +201,8 @@ class PlaneRefinementNodelet : public LazyNodelet {
   void process(const Frame& frame) {
     const ros::SteadyTime begin = ros::SteadyTime::now();
     const auto snapshot = parameters_->snapshot();
+    if (snapshot != snapshot_) refinement_ = DisparityRefinement();
+    snapshot_ = snapshot;
     const RefinementParameters* parameters = &snapshot->parameters;
     RefinementParameters without_image;
     const Disparity& in = *frame.disparity;
@@ -324,8 +328,9 @@ class PlaneRefinementNodelet : public LazyNodelet {
   /// than the best refinement.
   cv_bridge::CvImageConstPtr grayOf(const Frame& frame, const cv::Size& size, const std::string& topic) {
     if (!frame.image) {
-      // When the mode or a listener has just changed, frames are under way without.
-      if (without_image_ >= queue_size_) {
+      // When the mode or a listener has just changed, some frames are under way without.
+      constexpr int UNDER_WAY = 5;
+      if (++without_image_lately_ > UNDER_WAY) {
         monitor_->warning("no image on " + topic +
                           " with the stamp of the disparity map: refined as in the paper, expected the left "
                           "image for refinement_mode Quality");
@@ -359,11 +364,12 @@ class PlaneRefinementNodelet : public LazyNodelet {
 
   std::unique_ptr<StageMonitor> monitor_;
   std::unique_ptr<LiveParameters<PlaneRefinementConfig>> parameters_;
+  std::shared_ptr<const LiveParameters<PlaneRefinementConfig>::Snapshot> snapshot_;  // Of the frame before.
   DisparityRefinement refinement_;
-  int queue_size_ = 1;
   double min_density_ = 0.0;
   std::atomic<bool> is_image_needed_{false};
-  std::atomic<long> without_image_{0};  // Frames that needed one.
+  std::atomic<long> without_image_{0};         // Frames that needed one,
+  std::atomic<long> without_image_lately_{0};  // and those since it was subscribed to.
   long labels_without_disparity_ = 0;
   std::atomic<bool> is_statistics_due_{true};
   std::mutex statistics_mutex_;

@@ -47,9 +47,7 @@ class SegmentationNodelet : public LazyNodelet {
     });
     parameters_ = std::make_unique<LiveParameters<SegmentationConfig>>(private_nh);
     queue_size_ = startParameter(private_nh, "queue_size", 5, 1, MAX_QUEUE_SIZE);
-    const int threads =
-        startParameter(private_nh, "segmentation_threads", 1, 1, FilteredWatershed::MAX_STRIPS);
-    segmentation_ = std::make_unique<Segmentation>(threads);
+    threads_ = startParameter(private_nh, "segmentation_threads", 1, 1, FilteredWatershed::MAX_STRIPS);
     worker_ = std::make_unique<FrameWorker<sensor_msgs::ImageConstPtr>>(
         queue_size_, *monitor_, [this](const sensor_msgs::ImageConstPtr& image) { process(image); });
     is_following_ = startParameter(private_nh, "follow_disparity", true);
@@ -92,6 +90,8 @@ class SegmentationNodelet : public LazyNodelet {
     const ros::SteadyTime begin = ros::SteadyTime::now();
     const auto snapshot = parameters_->snapshot();
     const SegmentationParameters& parameters = snapshot->parameters;
+    if (snapshot != snapshot_) segmentation_ = std::make_unique<Segmentation>(threads_);
+    snapshot_ = snapshot;
     monitor_->traceReceived("left/image_rect", image->header.stamp, image->data.data());
     const auto gray = grayImage(image, getNodeHandle().resolveName("left/image_rect"));
 
@@ -110,8 +110,10 @@ class SegmentationNodelet : public LazyNodelet {
 
   std::unique_ptr<StageMonitor> monitor_;
   std::unique_ptr<LiveParameters<SegmentationConfig>> parameters_;
+  std::shared_ptr<const LiveParameters<SegmentationConfig>::Snapshot> snapshot_;  // Of the frame before.
   std::unique_ptr<Segmentation> segmentation_;
   std::atomic<int> segments_{0};
+  int threads_ = 1;
   int queue_size_ = 5;
   bool is_following_ = true;
   ros::Publisher publisher_, parameters_publisher_;

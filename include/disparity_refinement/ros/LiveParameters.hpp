@@ -89,7 +89,8 @@ class LiveParameters {
     });
   }
 
-  /// Never null; it does not change any more.
+  /// Never null; it does not change any more. After every change there is another one: then a stage lets go of
+  /// the buffers of its core object, for those of other parameters may be much larger.
   std::shared_ptr<const Snapshot> snapshot() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return snapshot_;
