@@ -31,12 +31,15 @@ std::string address(const std::vector<std::uint8_t>& data) {
   return text.str();
 }
 
-/// Addresses that the log says were published or received for a topic and stamp, by nodelet. As long as it
-/// lives, it hears every line of this process.
+/// Addresses that the log says were published or received for a topic and stamp, by nodelet. It hears every
+/// line of this process, to its end: deregister_appender() of rosconsole 1.14 deletes what is deleted
+/// already.
 class AddressLog : public ros::console::LogAppender {
  public:
-  AddressLog() { ros::console::register_appender(this); }
-  ~AddressLog() override { ros::console::deregister_appender(this); }
+  static AddressLog& get() {
+    static auto* const log = new AddressLog;
+    return *log;
+  }
 
   /// A line such as "[/stereo/segmentation] published labels 1000.000000000 at 0x..."
   void log(ros::console::Level /*level*/, const char* text, const char* /*file*/, const char* /*function*/,
@@ -66,6 +69,8 @@ class AddressLog : public ros::console::LogAppender {
   }
 
  private:
+  AddressLog() { ros::console::register_appender(this); }
+
   const std::string AT = " at ";
   std::mutex mutex_;
   std::condition_variable logged_;
@@ -76,7 +81,7 @@ TEST(ZeroCopy, everyEdgePassesThePointer) {
   ros::console::set_logger_level("ros.disparity_refinement", ros::console::levels::Debug);
   ros::console::notifyLoggerLevelsChanged();
   ros::NodeHandle nh;
-  AddressLog log;
+  AddressLog& log = AddressLog::get();
 
   nodelet::Loader loader(nh);
   const std::map<std::string, std::string> remappings;
