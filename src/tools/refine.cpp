@@ -41,7 +41,7 @@ struct Calibration {
 
 struct Outputs {
   std::string png, color, pfm, ply, picture, source, confidence;
-  float color_max = 64.0F;  ///< Near end of the colour scale [px]
+  std::optional<float> color_max;  ///< Near end of the colour scale [px]
 
   /// Throws std::invalid_argument unless every name has the ending of its format and is another one.
   void validate() const {
@@ -145,8 +145,9 @@ void refinePair(const std::string& left_file, const std::string& right_file, Sta
   StereoMatcher matcher(parameters.matching());
   matcher.compute(left, right, result.disparity, geometry.principal_point_offset);
   const DisparityRange range = matcher.range(geometry.principal_point_offset);
-  requireArgument(std::isfinite(outputs.color_max) && outputs.color_max > range.min, "color-max",
-                  outputs.color_max, "a number above the smallest disparity, " + std::to_string(range.min));
+  const float color_max = outputs.color_max.value_or(std::max(64.0F, range.min + 64.0F));
+  requireArgument(std::isfinite(color_max) && color_max > range.min, "color-max", color_max,
+                  "a number above the smallest disparity, " + std::to_string(range.min));
   const int segments = Segmentation().compute(left, parameters.segmentation(), result.labels);
   DisparityRefinement refinement;
   refinement.refine(result.disparity, result.labels, left, range, geometry.focal_length * geometry.baseline,
@@ -165,7 +166,7 @@ void refinePair(const std::string& left_file, const std::string& right_file, Sta
   }
   if (!outputs.color.empty()) {
     cv::Mat bgr;
-    colorizeDisparity(result.refined, range, range.min, outputs.color_max, bgr);
+    colorizeDisparity(result.refined, range, range.min, color_max, bgr);
     writeImageFile(outputs.color, bgr);
     tell(outputs.color, "disparity in colours, black where unknown");
   }
@@ -180,7 +181,7 @@ void refinePair(const std::string& left_file, const std::string& right_file, Sta
   }
   if (!outputs.picture.empty()) {
     result.image = left;
-    result.scale_max = outputs.color_max;
+    result.scale_max = color_max;
     writeImageFile(outputs.picture, drawRefinement(result));
     tell(outputs.picture, "image, segments, disparity before and after");
   }
@@ -212,10 +213,10 @@ void run(int argc, char** argv) {
       "source-map", file_value(outputs.source), "where every disparity comes from, 0 ... 4, as PNG")(
       "confidence-map", file_value(outputs.confidence), "confidence in every disparity, 0 ... 255, as PNG")(
       "picture", file_value(outputs.picture), "image, segments, disparity before and after in one picture")(
-      "color-max", po::value(&outputs.color_max)->default_value(outputs.color_max),
-      "disparity at the near end of the colour scale [px]")(
-      "calibration", po::value<std::string>()->value_name("FILE"),
-      "KITTI calibration file with P0 and P1, or P_rect_00 and P_rect_01")(
+      "color-max", po::value<float>()->notifier([&outputs](float value) { outputs.color_max = value; }),
+      "disparity at the near end of the colour scale [px]; by default 64, or 64 above a positive "
+      "min_disparity")("calibration", po::value<std::string>()->value_name("FILE"),
+                       "KITTI calibration file with P0 and P1, or P_rect_00 and P_rect_01")(
       "focal-length", po::value<double>()->value_name("PX"),
       "of both images [px], which are taken as centred")("baseline", po::value<double>()->value_name("M"),
                                                          "distance of the cameras [m]");

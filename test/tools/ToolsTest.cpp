@@ -288,6 +288,7 @@ TEST_F(Tools, refineExplainsWhatItCannotDo) {
   expectError("refine " + pair() + " --color " + out("no/map.png"), "cannot write " + out("no/map.png"));
   expectError("refine " + pair() + " --color " + out("map.nothing"), "cannot write " + out("map.nothing"));
   expectError("refine " + pair() + " --color-max -1", "color-max is -1");
+  EXPECT_EQ(run("refine " + pair() + " --min_disparity 64 --output " + out("far.png")).exit_code, 0);
   expectError("refine " + pair() + " --pfm " + out("a.png"), "expected a file name that ends with .pfm");
   expectError("refine " + pair() + " -o " + out("a.png") + " --color " + out("a.png"),
               "is the name of two outputs");
