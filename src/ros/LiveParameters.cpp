@@ -117,6 +117,13 @@ VisualizationConfig toParameters(VisualizationConfig& config) {
   return config;
 }
 
+void waitUntilGone(const std::string& service) {
+  constexpr double PATIENCE = 2.0, PAUSE = 0.005;  // [s]
+  const ros::SteadyTime end = ros::SteadyTime::now() + ros::WallDuration(PATIENCE);
+  while (ros::service::exists(service, false) && ros::SteadyTime::now() < end)
+    ros::WallDuration(PAUSE).sleep();
+}
+
 void warnAboutRefusedValues(const ros::NodeHandle& private_nh, const dynamic_reconfigure::Config& in_force,
                             const dynamic_reconfigure::Config& least,
                             const dynamic_reconfigure::Config& largest) {

@@ -149,6 +149,11 @@ TEST_F(StartStop, nodeletIsLoadedAgainAndAgain) {
   const Driver driver(camera_);
   expectFrames();
   for (const std::string& nodelet : NODELETS) {
+    // Even if it is unloaded in the middle of a callback.
+    const auto expectParameters = [&nodelet] {
+      const std::string service = "/stereo/" + nodelet + "/set_parameters";
+      EXPECT_EQ(ros::service::exists(service, false), nodelet != "depth") << service;
+    };
     // The first time costs what is only made once.
     unload(nodelet);
     load(nodelet);
@@ -158,7 +163,8 @@ TEST_F(StartStop, nodeletIsLoadedAgainAndAgain) {
       unload(nodelet);
       load(nodelet);
       // At another moment of a frame each time.
-      std::this_thread::sleep_for(std::chrono::milliseconds(17 * i));
+      std::this_thread::sleep_for(std::chrono::milliseconds(7 * i));
+      expectParameters();
     }
     expectFrames();
     expectNoGrowth(before, TIMES, nodelet);

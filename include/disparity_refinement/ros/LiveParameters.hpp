@@ -10,6 +10,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <utility>
 
 #include "disparity_refinement/DisparityConfig.h"
@@ -47,6 +48,11 @@ void warnAboutRefusedValues(const ros::NodeHandle& private_nh, const dynamic_rec
                             const dynamic_reconfigure::Config& least,
                             const dynamic_reconfigure::Config& largest);
 
+/// Waits until nobody offers this service, for two seconds at most. A nodelet that is unloaded in the middle
+/// of a callback lives on until that ends, beside the one that is loaded in its place, which could not offer
+/// it.
+void waitUntilGone(const std::string& service);
+
 /// The parameters of one nodelet, live through dynamic_reconfigure on its private handle. A frame takes one
 /// snapshot.
 template <class Config>
@@ -73,6 +79,7 @@ class LiveParameters {
     Config::__getMax__().__toMessage__(largest);
     warnAboutRefusedValues(private_nh, in_force, least, largest);
 
+    waitUntilGone(private_nh.resolveName("set_parameters"));
     server_.reset(new dynamic_reconfigure::Server<Config>(server_mutex_, private_nh));
     // Calls back at once.
     server_->setCallback([this](Config& config, std::uint32_t) {
@@ -89,8 +96,8 @@ class LiveParameters {
     });
   }
 
-  /// Never null; it does not change any more. After every change there is another one: then a stage lets go of
-  /// the buffers of its core object, for those of other parameters may be much larger.
+  /// Never null; it does not change any more. After every change there is another one: then a stage lets go
+  /// of the buffers of its core object, for those of other parameters may be much larger.
   std::shared_ptr<const Snapshot> snapshot() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return snapshot_;
