@@ -135,5 +135,25 @@ TEST_F(Flow, overlapsTheStagesIfTheSecondIsShort) {
   EXPECT_GT(delay(), 0.0);
 }
 
+TEST_F(Flow, isNotHeldUpByAFrameThatWasHeldUp) {
+  start(1);
+  refineInTurn(1, 60.0);
+  match(1);
+  EXPECT_GT(delay(), 0.0);
+  EXPECT_LT(delay(), 5.0);
+}
+
+TEST_F(Flow, takesAnAnswerForTheNewestFrameOfItsStamp) {
+  start(1);
+  match(1);
+  pass(1.5);
+  match(1);
+  pass(0.1);
+  refine(1);
+  EXPECT_EQ(delay(), 0.0) << "nothing is under way";
+  match(2);
+  EXPECT_LT(delay(), 0.5) << "a refinement takes a tenth of a second";
+}
+
 }  // namespace
 }  // namespace disparity_refinement

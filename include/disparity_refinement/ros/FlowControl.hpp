@@ -35,20 +35,21 @@ class FlowControl {
   /// ignored.
   void refined(const ros::Time& stamp, const ros::SteadyTime& now) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    const auto found = std::find_if(under_way_.begin(), under_way_.end(),
+    // The newest: in a loop, an older one of the same stamp may never have been refined.
+    const auto found = std::find_if(under_way_.rbegin(), under_way_.rend(),
                                     [&stamp](const auto& frame) { return frame.first == stamp; });
-    if (found == under_way_.end()) return;
+    if (found == under_way_.rend()) return;
     is_answered_ = true;
     refinement_time_ = (now - found->second).toSec();
-    under_way_.erase(under_way_.begin(), found + 1);
+    under_way_.erase(under_way_.begin(), found.base());
   }
 
   /// How long to wait before the next frame is begun [s], unless one is refined first; 0: no longer.
   double delay(const ros::SteadyTime& now) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!is_answered_ || under_way_.size() < maxFrames()) return 0.0;
-    const double rest =
-        PATIENCE * std::max(MIN_TIME, refinement_time_) - (now - under_way_.back().second).toSec();
+    const double rest = PATIENCE * std::clamp(refinement_time_, MIN_TIME, MAX_TIME) -
+                        (now - under_way_.back().second).toSec();
     // The frame was lost on its way, or nobody refines any more.
     if (rest <= 0.0) is_answered_ = false;
     return std::max(0.0, rest);
@@ -58,6 +59,7 @@ class FlowControl {
   static constexpr std::size_t REMEMBERED = 100;  // Frames.
   static constexpr double PATIENCE = 2.0;         // Refinements like the one before.
   static constexpr double MIN_TIME = 0.02;        // [s]
+  static constexpr double MAX_TIME = 2.0;         // Longer, the frame has waited for something else [s].
   static constexpr double SHORT = 0.25;  // Share of the matching's time that a refinement may share with it.
 
   std::size_t maxFrames() const {

@@ -28,15 +28,14 @@ class FrameGate {
   /// Called with the number of frames that were not announced.
   using Drop = std::function<void(int)>;
 
-  /// @param patience  How long after the last announcement frames wait for theirs: for three times as long
-  ///                  as the last two announcements were apart, but for no less than this and no more than
-  ///                  ten times this.
+  /// @param patience  How long after the last announcement frames wait for theirs.
   FrameGate(std::size_t capacity, const ros::WallDuration& patience, Emit emit, Drop drop)
       : capacity_(capacity), patience_(patience), emit_(std::move(emit)), drop_(std::move(drop)) {}
 
   void addFrame(const MessagePtr& frame) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (take(announced_, frame->header.stamp)) {
+      passed_.clear();
       emit_(frame);
     } else if (!isClosed()) {
       passUnannounced(frame);
@@ -53,9 +52,7 @@ class FrameGate {
   /// any more.
   void announce(const ros::Time& stamp) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    const ros::SteadyTime now = ros::SteadyTime::now();
-    if (last_announcement_) interval_ = now - *last_announcement_;
-    last_announcement_ = now;
+    last_announcement_ = ros::SteadyTime::now();
     const auto found = std::find_if(waiting_.rbegin(), waiting_.rend(), [&stamp](const MessagePtr& frame) {
       return frame->header.stamp == stamp;
     });
@@ -63,6 +60,7 @@ class FrameGate {
       const MessagePtr frame = *found;
       const auto overtaken = std::distance(waiting_.begin(), found.base()) - 1;
       waiting_.erase(waiting_.begin(), found.base());
+      passed_.clear();
       if (overtaken > 0) drop_(static_cast<int>(overtaken));
       emit_(frame);
     } else if (!take(passed_, stamp)) {
@@ -80,8 +78,7 @@ class FrameGate {
 
  private:
   bool isClosed() const {
-    return last_announcement_ && ros::SteadyTime::now() - *last_announcement_ <
-                                     std::clamp(interval_ * 3.0, patience_, patience_ * 10.0);
+    return last_announcement_ && ros::SteadyTime::now() - *last_announcement_ < patience_;
   }
 
   void passUnannounced(const MessagePtr& frame) {
@@ -108,10 +105,11 @@ class FrameGate {
   const Drop drop_;
   std::mutex mutex_;
   std::optional<ros::SteadyTime> last_announcement_;
-  ros::WallDuration interval_;  ///< Between the last two.
   std::deque<MessagePtr> waiting_;
   std::deque<ros::Time> announced_;  ///< Frames that have not come yet.
-  std::deque<ros::Time> passed_;     ///< Frames that did not wait for their announcement.
+  /// Frames that did not wait for their announcement, since one last did: announcements are in order, and
+  /// in a loop the same stamp will come again.
+  std::deque<ros::Time> passed_;
 };
 
 }  // namespace disparity_refinement
