@@ -39,8 +39,7 @@ class DepthNodelet : public LazyNodelet {
     ros::NodeHandle& nh = getNodeHandle();
     ros::NodeHandle& private_nh = getPrivateNodeHandle();
     monitor_ = std::make_unique<StageMonitor>(getName(), nh, private_nh);
-    const auto queue_size =
-        static_cast<std::size_t>(startParameter(private_nh, "queue_size", 1, 1, MAX_QUEUE_SIZE));
+    const auto queue_size = startFrames(private_nh, "queue_size", 1);
     worker_ = std::make_unique<FrameWorker<Disparity::ConstPtr>>(
         queue_size, *monitor_, [this](const Disparity::ConstPtr& disparity) { process(*disparity); });
     depth_publisher_ = advertise<sensor_msgs::Image>(nh, "depth/image_rect");

@@ -41,10 +41,8 @@ class DisparityNodelet : public LazyNodelet {
     ros::NodeHandle& private_nh = getPrivateNodeHandle();
     monitor_ = std::make_unique<StageMonitor>(getName(), nh, private_nh);
     parameters_ = std::make_unique<LiveParameters<DisparityConfig>>(private_nh);
-    const auto queue_size =
-        static_cast<std::size_t>(startParameter(private_nh, "queue_size", 1, 1, MAX_QUEUE_SIZE));
-    const auto max_frames =
-        static_cast<std::size_t>(startParameter(private_nh, "max_frames_in_flight", 0, 0, MAX_QUEUE_SIZE));
+    const auto queue_size = startFrames(private_nh, "queue_size", 1);
+    const auto max_frames = startFrames(private_nh, "max_frames_in_flight", 0, 0);
     flow_control_ = std::make_unique<FlowControl>(max_frames, cv::getNumThreads());
     worker_ = std::make_unique<FrameWorker<StereoFrame>>(
         queue_size, *monitor_, [this](const StereoFrame& frame) { process(frame); },

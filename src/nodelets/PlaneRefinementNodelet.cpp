@@ -67,11 +67,9 @@ class PlaneRefinementNodelet : public LazyNodelet {
     ros::NodeHandle& private_nh = getPrivateNodeHandle();
     monitor_ = std::make_unique<StageMonitor>(getName(), nh, private_nh);
     parameters_ = std::make_unique<LiveParameters<PlaneRefinementConfig>>(private_nh, [this] { update(); });
-    const auto queue_size =
-        static_cast<std::size_t>(startParameter(private_nh, "queue_size", 1, 1, MAX_QUEUE_SIZE));
+    const auto queue_size = startFrames(private_nh, "queue_size", 1);
     min_density_ = startParameter(private_nh, "diagnostics_min_density", 0.0, 0.0, 1.0);
-    const auto cache_size =
-        static_cast<std::size_t>(startParameter(private_nh, "cache_size", 30, 1, MAX_QUEUE_SIZE));
+    const auto cache_size = startFrames(private_nh, "cache_size", 30);
     worker_ = std::make_unique<FrameWorker<Frame>>(queue_size, *monitor_, [this](const Frame& frame) {
       // In whatever way it ends.
       const std::shared_ptr<void> announcement(nullptr, [&](void* /*unused*/) {

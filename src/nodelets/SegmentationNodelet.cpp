@@ -46,14 +46,14 @@ class SegmentationNodelet : public LazyNodelet {
       status.add("h [gray levels]", parameters.h);
     });
     parameters_ = std::make_unique<LiveParameters<SegmentationConfig>>(private_nh);
-    queue_size_ = startParameter(private_nh, "queue_size", 5, 1, MAX_QUEUE_SIZE);
+    const auto queue_size = startFrames(private_nh, "queue_size", 5);
     threads_ = startParameter(private_nh, "segmentation_threads", 1, 1, FilteredWatershed::MAX_STRIPS);
     worker_ = std::make_unique<FrameWorker<sensor_msgs::ImageConstPtr>>(
-        queue_size_, *monitor_, [this](const sensor_msgs::ImageConstPtr& image) { process(image); });
+        queue_size, *monitor_, [this](const sensor_msgs::ImageConstPtr& image) { process(image); });
     is_following_ = startParameter(private_nh, "follow_disparity", true);
     // More than a second without a disparity map: there is no matcher, or one that does not care.
     gate_ = std::make_unique<FrameGate<sensor_msgs::Image>>(
-        static_cast<std::size_t>(queue_size_ + 2), ros::WallDuration(1.0),
+        queue_size + 2, ros::WallDuration(1.0),
         [this](const sensor_msgs::ImageConstPtr& image) { worker_->push(image); },
         [this](int frames) {
           monitor_->received(frames);
@@ -114,7 +114,6 @@ class SegmentationNodelet : public LazyNodelet {
   std::unique_ptr<Segmentation> segmentation_;
   std::atomic<int> segments_{0};
   int threads_ = 1;
-  int queue_size_ = 5;
   bool is_following_ = true;
   ros::Publisher publisher_, parameters_publisher_;
   std::unique_ptr<FrameGate<sensor_msgs::Image>> gate_;

@@ -68,8 +68,7 @@ class VisualizationNodelet : public LazyNodelet {
     constexpr std::size_t PICTURES = 6;
     worker_ =
         std::make_unique<FrameWorker<Picture>>(PICTURES, *monitor_, [](const Picture& draw) { draw(); });
-    const auto cache_size =
-        static_cast<std::size_t>(startParameter(private_nh, "cache_size", 30, 1, MAX_QUEUE_SIZE));
+    const auto cache_size = startFrames(private_nh, "cache_size", 30);
     const auto ignore = [](const auto&) {};
     borders_join_ = std::make_unique<StampJoin<Image, Image>>(
         cache_size,

@@ -62,4 +62,9 @@ bool startParameter(const ros::NodeHandle& private_nh, const std::string& name, 
   return fallback;
 }
 
+std::size_t startFrames(const ros::NodeHandle& private_nh, const std::string& name, int fallback, int least) {
+  constexpr int MOST = 100000;
+  return static_cast<std::size_t>(startParameter(private_nh, name, fallback, least, MOST));
+}
+
 }  // namespace disparity_refinement

@@ -2,6 +2,7 @@
 
 #include <ros/node_handle.h>
 
+#include <cstddef>
 #include <string>
 
 namespace disparity_refinement {
@@ -16,7 +17,8 @@ double startParameter(const ros::NodeHandle& private_nh, const std::string& name
                       double least, double largest);
 bool startParameter(const ros::NodeHandle& private_nh, const std::string& name, bool fallback);
 
-/// Of queue_size and cache_size [frames].
-constexpr int MAX_QUEUE_SIZE = 100000;
+/// A number of frames, from `least` to 100000.
+std::size_t startFrames(const ros::NodeHandle& private_nh, const std::string& name, int fallback,
+                        int least = 1);
 
 }  // namespace disparity_refinement
